@@ -15,7 +15,7 @@ from pathlib import Path
 import gripgen as gg
 import numpy as np
 
-SENSOR = Path(__file__).parent.parent / "assets/sensors/gelsight_r15/sensor.npz"
+SENSOR = Path(__file__).parent.parent / "assets/sensors/gelsight_synthetic/sensor.npz"
 ELASTIC = {"young_modulus_mpa": 0.145, "poisson_ratio": 0.48}
 
 

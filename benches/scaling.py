@@ -17,7 +17,7 @@ import zipfile
 from pathlib import Path
 
 QUICKSTART = "asset:configs/quickstart.toml"
-SENSOR = Path(__file__).parent.parent / "assets/sensors/gelsight_r15/sensor.npz"
+SENSOR = Path(__file__).parent.parent / "assets/sensors/gelsight_synthetic/sensor.npz"
 
 
 def sphere(path, rings):

@@ -5,7 +5,8 @@ use crate::resolve::Files;
 use gripgen_physics::Cache;
 use gripgen_physics::{ArmError, ArmModel, PartShape, PlacedArm, ShapeError, Surface, UrdfError};
 use gripgen_record::{decode_picture, sha256_hex};
-use gripgen_tactile::{ClusteredMesh, Sensor, SensorError, SensorFiles};
+use gripgen_tactile::{ClusteredMesh, Sensor, SensorError, SensorFiles, TableReading};
+use gripgen_twin::config::TableChannels;
 use gripgen_twin::{Gel, MeshError, NO_MESH, Optics, Part, RobotArm, TriMesh, Twin};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,8 +32,8 @@ pub struct Library {
     sensors: Cache<SensorKey, Sensor>,
 }
 
-/// Files of a sensor (sensor, background, gel map, shadow table) and the bits of its pixel size.
-type SensorKey = ([Option<String>; 4], Option<u64>);
+/// Files of a sensor (sensor, background, gel map, shadow table), the bits of its pixel size, how its table is read.
+type SensorKey = ([Option<String>; 4], Option<u64>, (Option<u32>, Option<TableChannels>));
 
 /// Why a file cannot be used. The message names it.
 #[derive(Debug, thiserror::Error)]
@@ -104,6 +105,9 @@ impl LibraryError {
     pub fn hint(&self) -> Option<&'static str> {
         match self {
             LibraryError::Mesh { source, .. } => Some(source.hint()),
+            LibraryError::Sensor { source: SensorError::TableScale { .. }, .. } => Some(
+                "set table_width_px in the same section of the twin: the width of the images on which the table was made",
+            ),
             LibraryError::Sensor { source: SensorError::Incomplete { .. }, .. } => {
                 Some("give it in the same section of the twin")
             }
@@ -274,7 +278,8 @@ impl Library {
             optics.gel_map.clone(),
             optics.shadow_table.clone(),
         ];
-        self.sensors.get((named, optics.metres_per_px.map(f64::to_bits)), || {
+        let table = (optics.table_width_px, optics.table_channels);
+        self.sensors.get((named, optics.metres_per_px.map(f64::to_bits), table), || {
             let beside = |path: &Option<String>| path.as_ref().map(|path| self.file(path)).transpose();
             let picture = beside(&optics.background)?.map(|(location, bytes)| {
                 decode_picture(bytes)
@@ -283,12 +288,17 @@ impl Library {
             let background = picture.transpose()?;
             let (gel_map, shadow_table) = (beside(&optics.gel_map)?, beside(&optics.shadow_table)?);
             let sensor = self.file(&optics.sensor)?;
+            let usual = TableReading::default();
             let files = SensorFiles {
                 sensor: &sensor.1,
                 metres_per_px: optics.metres_per_px,
                 background: background.as_ref(),
                 gel_map: gel_map.map(|(_, bytes)| &bytes[..]),
                 shadow_table: shadow_table.map(|(_, bytes)| &bytes[..]),
+                table: TableReading {
+                    width_px: optics.table_width_px.unwrap_or(usual.width_px),
+                    channels: optics.table_channels.unwrap_or(usual.channels),
+                },
             };
             Sensor::from_files(&files).map_err(|source| {
                 let faulty = match &source {

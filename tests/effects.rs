@@ -287,7 +287,7 @@ const OPTICS: &[(&str, &str)] = &[
     ("gel_kernel", "factor = 1.3"),
     ("cad_mismatch", "offset_mm = 0.1\nblunting_mm = 0.2"),
     ("rest_offset", "red = 3.0"),
-    ("cast_shadow", "strength = 0.4\nelevation_deg = 15.0"),
+    ("cast_shadow", "strength = 0.4\nelevation_deg = 8.0"),
     ("gel_dome", "sag_mm = 0.5"),
     ("press_gain", "red = 1.05\nblue = 0.95\nred_sd = 0.1\ngreen_sd = 0.1\nblue_sd = 0.1"),
     ("press_depth", "offset_mm = 0.1"),

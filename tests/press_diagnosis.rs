@@ -14,7 +14,7 @@ const PRESSES: usize = 12;
 const BALL_M: f64 = 6e-3;
 
 fn sensor() -> Sensor {
-    let bytes = std::fs::read(root().join("assets/sensors/gelsight_r15/sensor.npz")).unwrap();
+    let bytes = std::fs::read(root().join("assets/sensors/gelsight_synthetic/sensor.npz")).unwrap();
     Sensor::from_npz(&bytes, None, None).unwrap()
 }
 

@@ -82,7 +82,9 @@ fn the_gels_of_the_jaws_may_differ() {
     let sets = ["vary.part=[\"long_shaft\"]", "vary.grip_force_n=[60]", "vary.grip_angle_deg=[0]"];
     let same = pulled(generate(&quiet(&sets), 0, SimdLevel::best()));
     let other = ["gel.right.shear_stiffness_n_per_mm=5", "gel.right.kernels_px=[21, 11]"];
-    let with_images = [&["images=png", "optics.left.image_noise=off"], &sets[..2]].concat();
+    // A sensor file without kernels of its own: those of the gel count.
+    let sensor = "optics.left.sensor=asset:sensors/gelsight_synthetic/sensor.npz";
+    let with_images = [&["images=png", "optics.left.image_noise=off", sensor], &sets[..2]].concat();
     let images = |more: &[&str]| {
         let sets: Vec<&str> = with_images.iter().chain(more).copied().collect();
         pulled(generate(&quiet(&sets), 0, SimdLevel::best())).images.unwrap()

@@ -3,7 +3,10 @@
 use crate::common::root;
 use gripgen::record::decode_picture;
 use gripgen::tactile::npz::{Array, Npz};
-use gripgen::tactile::{ColourModel, Plane, Relief, Sensor, SensorFiles, SimdLevel, gradient, shade, shadow};
+use gripgen::tactile::{
+    ColourModel, Plane, Relief, Sensor, SensorError, SensorFiles, SimdLevel, TableReading, gradient, shade,
+    shadow,
+};
 use gripgen::twin::TactileImage;
 
 const W: usize = 640;
@@ -27,6 +30,7 @@ pub(crate) fn frame() -> TactileImage {
 /// Taxim's default sensor, from its own files.
 pub(crate) fn sensor() -> Sensor {
     Sensor::from_files(&SensorFiles {
+        table: Default::default(),
         sensor: &bytes("gelsight/polycalib.npz"),
         metres_per_px: Some(0.0295e-3),
         background: Some(&frame()),
@@ -209,6 +213,42 @@ fn published_examples_are_reproduced() {
             );
             assert!(mean < if kind == "sim" { 0.76 } else { 0.57 }, "{name}_{kind}: {mean}");
             assert!(square < 0.1, "{name}_{kind}: {square}");
+        }
+    }
+}
+
+/// A table that is read in the positions of other images is refused, and the width of its own is named.
+#[test]
+#[cfg_attr(not(shared_data), ignore = "the folder of shared measured data is not beside this checkout")]
+fn tables_of_narrower_images_are_refused_as_wide_ones() {
+    let picture = |path: &str| decode_picture(&bytes(path)).unwrap();
+    let tables = [
+        ("gelsight/polycalib.npz", frame(), 640),
+        ("taxim_robot/polycalib.npz", picture("taxim_robot/bg.jpg"), 640),
+        ("tacsl/gelsight_r15_data/polycalib.npz", picture("tacsl/gelsight_r15_data/bg.jpg"), 240),
+        ("tacsl/gs_mini_data/polycalib.npz", picture("tacsl/gs_mini_data/bg.jpg"), 320),
+    ];
+    for (path, rest, own_px) in &tables {
+        let read = |width_px| {
+            Sensor::from_files(&SensorFiles {
+                table: TableReading { width_px, ..Default::default() },
+                sensor: &bytes(path),
+                metres_per_px: Some(1e-4),
+                background: Some(rest),
+                gel_map: None,
+                shadow_table: None,
+            })
+        };
+        assert!(read(*own_px).is_ok(), "{path}");
+        match (read(640), *own_px) {
+            (found, 640) => assert!(found.is_ok(), "{path}"),
+            (Err(SensorError::TableScale { share_percent, likely_px, .. }), own_px) => {
+                assert!(
+                    share_percent > 12.0 && likely_px.contains(&own_px),
+                    "{path}: {share_percent} {likely_px:?}"
+                );
+            }
+            (found, _) => panic!("{path}: {:?}", found.map(|_| ())),
         }
     }
 }

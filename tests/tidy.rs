@@ -331,7 +331,9 @@ fn check_units(value: &toml::Value, file: &str, key: &str, plain: &[&str], units
 /// Every asset says where it comes from.
 #[test]
 fn assets_state_their_provenance() {
-    for folder in ["assets", "assets/parts", "assets/sensors/gelsight_r15", "assets/configs"] {
+    for folder in
+        ["assets", "assets/parts", "assets/sensors", "assets/sensors/gelsight_r15", "assets/configs"]
+    {
         let text = read(&format!("{folder}/README.md"));
         assert!(text.len() > 300, "{folder}/README.md is too short to be of use");
     }

@@ -11,7 +11,7 @@ import gripgen as gg
 from .conftest import CONFIG, SMALL, content
 
 ASSETS = Path(__file__).parents[2] / "assets"
-SENSOR = "asset:sensors/gelsight_r15/sensor.npz"
+SENSOR = "asset:sensors/gelsight_synthetic/sensor.npz"
 
 
 def hint_of(call, *arguments, **keywords):

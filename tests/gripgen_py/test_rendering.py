@@ -7,7 +7,7 @@ import gripgen as gg
 
 from .conftest import command_line
 
-SENSOR = "asset:sensors/gelsight_r15/sensor.npz"
+SENSOR = "asset:sensors/gelsight_synthetic/sensor.npz"
 
 
 @pytest.fixture

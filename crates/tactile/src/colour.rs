@@ -9,7 +9,7 @@ pub use lambert::{Lambert, Light};
 pub use regressor::Regressor;
 use regressor::{DrawScratch, Planes};
 pub(crate) use taxim::Sectors;
-pub use taxim::TaximTable;
+pub use taxim::{TableReading, TaximTable};
 
 use crate::gradient::gradient;
 use crate::grid::Plane;

@@ -40,6 +40,8 @@ pub struct Sensor {
     /// Standard deviation of the logarithm of the gain of red, green and blue from one press to the next, where the camera of the
     /// calibration had an automatic white balance. Images are compared and fitted without it, and drawn without it.
     pub press_gain_sd: Option<[f32; 3]>,
+    /// Whether it stands for a real sensor and no press of that sensor was compared with it.
+    pub unverified: bool,
 }
 
 /// The blurs that stand for the deformation of the gel.
@@ -71,6 +73,7 @@ impl Sensor {
             pyramid: None,
             ball_m: None,
             press_gain_sd: None,
+            unverified: false,
         }
     }
 

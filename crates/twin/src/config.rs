@@ -25,8 +25,8 @@ pub use sweep_file::{
 };
 pub use twin_file::{
     ArmFile, CalibrationFile, EffectFile, Feedback, ForceConvention, GelFile, GelModel, GripFile,
-    GripperFile, ImageNoise, OpticsFile, PartFile, PerJawFile, RobotFile, RobotModel, TwinFile, Twist,
-    WristFile,
+    GripperFile, ImageNoise, OpticsFile, PartFile, PerJawFile, RobotFile, RobotModel, TableChannels,
+    TwinFile, Twist, WristFile,
 };
 
 use std::ops::RangeBounds;

@@ -3,7 +3,8 @@
 mod check;
 
 use crate::config::{
-    ConfigError, EffectFile, Feedback, ForceConvention, GelModel, ImageNoise, RobotModel, TwinFile, Twist,
+    ConfigError, EffectFile, Feedback, ForceConvention, GelModel, ImageNoise, RobotModel, TableChannels,
+    TwinFile, Twist,
 };
 use crate::effects::{self, Effect};
 use crate::frames::{Pose, pose};
@@ -176,6 +177,10 @@ pub struct Optics {
     pub gel_map: Option<String>,
     /// Path of the shadow table, as written in the twin.
     pub shadow_table: Option<String>,
+    /// Width of the images in whose positions a colour table was fitted; 640 without it.
+    pub table_width_px: Option<u32>,
+    /// Order of the channels of a colour table; blue first without it.
+    pub table_channels: Option<TableChannels>,
     /// Whether the images carry noise.
     pub image_noise: ImageNoise,
 }
@@ -297,12 +302,17 @@ impl Twin {
                 file.optics.right.as_ref().filter(|_| jaw == Jaw::Right).unwrap_or(&file.optics.left);
             let key = format!("optics.{jaw}.mm_per_px");
             let mm_per_px = section.mm_per_px.map(|x| in_range(&key, x, 1e-4..=1.0, "mm")).transpose()?;
+            let key = format!("optics.{jaw}.table_width_px");
+            let width = section.table_width_px.map(|x| in_range(&key, f64::from(x), 16.0..=4096.0, "px"));
+            let table_width_px = width.transpose()?.map(|x| x as u32);
             Ok(Optics {
                 sensor: section.sensor.clone(),
                 metres_per_px: mm_per_px.map(|x| x * 1e-3),
                 background: section.background.clone(),
                 gel_map: section.gel_map.clone(),
                 shadow_table: section.shadow_table.clone(),
+                table_width_px,
+                table_channels: section.table_channels,
                 image_noise: section.image_noise,
             })
         })?;

@@ -66,6 +66,7 @@ pub fn check(
             "jobs": jobs,
             "probes": probes,
             "grips": grips,
+            "unverified_sensors": unverified_sensors(&project),
             "label_shares": shares.as_ref().map(LabelShares::json),
             "warnings": warnings,
         }))?;
@@ -84,6 +85,15 @@ pub fn check(
     }
     let grips_fail = plan.grips.iter().any(|g| !g.failed.is_empty());
     Ok(if failed.is_empty() && !grips_fail { 0 } else { code::SAMPLES_FAILED })
+}
+
+/// The sensor files of the twin that stand for a real sensor and were not compared with it.
+fn unverified_sensors(project: &Project) -> Vec<&str> {
+    let optics = project.twin.optics.iter().map(|(_, optics)| optics);
+    let unverified = optics.filter(|optics| project.library.sensor(optics).is_ok_and(|s| s.unverified));
+    let mut names: Vec<&str> = unverified.map(|optics| optics.sensor.as_str()).collect();
+    names.dedup();
+    names
 }
 
 /// The sweep that was named.
@@ -210,5 +220,8 @@ pub fn describe(project: &Project, plan: &Plan, jobs: usize) -> String {
     let varied: Vec<&str> = varies.map(|v| v.key.as_str()).collect();
     let varied = if varied.is_empty() { "nothing".into() } else { varied.join(", ") };
     text += &format!("varies: {varied}\n");
+    for sensor in unverified_sensors(project) {
+        text += &format!("{sensor}: no press of the real sensor was compared with this file\n");
+    }
     text
 }

@@ -42,7 +42,7 @@ impl World {
         let root = folder.path().canonicalize().unwrap();
         let world = Self { folder, root };
         let copy = |asset: &str, name: &str| world.put(name, gripgen::assets::get(asset).unwrap());
-        copy("sensors/gelsight_r15/sensor.npz", "sensor.npz");
+        copy("sensors/gelsight_synthetic/sensor.npz", "sensor.npz");
         copy("parts/gear/part.stl", "part.stl");
         copy("configs/rig.toml", "rig.toml");
         copy("configs/twin-baseline.toml", "shipped.toml");

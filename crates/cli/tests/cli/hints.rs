@@ -41,7 +41,7 @@ fn flags_that_hints_name_are_what_was_missing() {
     let (out, taken) = (path("out.png"), path("taken.csv"));
     std::fs::write(&taken, "mine").unwrap();
     let part = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/parts/gear/part.stl");
-    let render = ["render", part, "--sensor", "asset:sensors/gelsight_r15/sensor.npz", "-o", &out];
+    let render = ["render", part, "--sensor", "asset:sensors/gelsight_synthetic/sensor.npz", "-o", &out];
     let depth = hint(&run(&render), "--depth-mm");
     let value =
         depth.split("--depth-mm ").nth(1).and_then(|rest| rest.split(['`', ',', ' ']).next()).unwrap();

@@ -456,7 +456,7 @@ fn a_benchmark_says_what_it_measured() {
     let missing = run(&["bench", "--seconds", "0.05", "--sensor", "no-such-sensor.npz"]);
     assert_code(&missing, 1);
     assert!(text(&missing.stderr).contains("no-such-sensor.npz"), "{}", text(&missing.stderr));
-    let sensor = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/sensors/gelsight_r15/sensor.npz");
+    let sensor = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/sensors/gelsight_synthetic/sensor.npz");
     let output = run(&["bench", "--seconds", "0.05", "--sensor", sensor, "--json"]);
     assert_code(&output, 0);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

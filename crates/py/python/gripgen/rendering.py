@@ -37,12 +37,14 @@ def render(
     y_px: float | None = None,
     rotation_deg: float = 0.0,
     scale_mm_per_unit: float | None = None,
+    edge_radius_mm: float = 0.2,
 ) -> Rendered:
     """Press a mesh or a surface into a sensor and look at it.
 
     With the path of a mesh (STL, OBJ, PLY, GLB) it is `gripgen render`: the tip of the mesh points along its +z into the gel and
     travels `depth_mm` after its highest vertex touched; +x is the image's right, +y its top; `x_px`, `y_px` are the place of
-    the mesh's origin (default: the middle of the image), `rotation_deg` turns it counter-clockwise.
+    the mesh's origin (default: the middle of the image), `rotation_deg` turns it counter-clockwise. Its convex edges have the radius
+    `edge_radius_mm`, that of printed ones unless it is given; 0 leaves them sharp.
 
     With an array (H, W), or a path of one (`.npy`), its values are how far the pressed surface stands above the gel at rest,
     in mm: above 0 it indents, `-inf` is no surface. `depth_mm` moves the whole surface until its highest point is so deep.
@@ -54,6 +56,6 @@ def render(
     if not isinstance(source, str | os.PathLike):
         source = np.asarray(source, dtype=np.float64)
     found = _core.render(
-        source, os.fspath(sensor), depth_mm, x_px, y_px, rotation_deg, scale_mm_per_unit
+        source, os.fspath(sensor), depth_mm, x_px, y_px, rotation_deg, scale_mm_per_unit, edge_radius_mm
     )
     return Rendered(**found)

@@ -7,12 +7,38 @@ pub(crate) use bins::Sectors;
 
 use crate::grid::Plane;
 use crate::npz::{Npz, NpzError};
+use crate::sensor::SensorError;
 use bins::Steepness;
 use gripgen_twin::TactileImage;
+use gripgen_twin::config::TableChannels;
 use std::f64::consts::PI;
 
 /// Width in pixels of the images on which Taxim's tables are calibrated; the polynomials use their coordinates.
 const CALIBRATION_WIDTH_PX: f64 = 640.0;
+
+/// A channel that leaves 0 to 255 by more grey levels than this is none of a camera.
+const OUTSIDE_GREY_LEVELS: f32 = 10.0;
+/// The largest share of such values in a table that is read in the positions in which it was made. Eight public tables have 0.0 to
+/// 1.7 % there; the three made of narrower images have 12 to 62 % where they are read as 640 px wide.
+const MOST_OUTSIDE: f64 = 0.05;
+/// Places along each axis of the image at which that is looked at.
+const PLACES: [usize; 2] = [8, 6];
+
+/// How a `polycalib.npz` is read: what its arrays do not say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableReading {
+    /// Width of the images in whose positions its polynomials were fitted.
+    pub width_px: u32,
+    /// Order of its channels.
+    pub channels: TableChannels,
+}
+
+impl Default for TableReading {
+    /// As Taxim's own tables are.
+    fn default() -> Self {
+        Self { width_px: CALIBRATION_WIDTH_PX as u32, channels: TableChannels::Bgr }
+    }
+}
 
 /// Middle of the calibration's images, from which the polynomials are evaluated so that single precision suffices.
 const MIDDLE_PX: [f64; 2] = [320.0, 240.0];
@@ -36,9 +62,14 @@ pub struct TaximTable {
 
 impl TaximTable {
     /// Reads `grad_b`, `grad_g`, `grad_r`; their first axis tells the number of bins. `frame` is the image without
-    /// contact, of the size of the images to come.
-    pub(crate) fn read(npz: &mut Npz<'_>, frame: &TactileImage) -> Result<Self, NpzError> {
+    /// contact, of the size of the images to come. Positions of narrower or wider images become those of 640 px.
+    pub(crate) fn read(
+        npz: &mut Npz<'_>,
+        frame: &TactileImage,
+        reading: TableReading,
+    ) -> Result<Self, NpzError> {
         let mut bins = 0;
+        let s = f64::from(reading.width_px) / CALIBRATION_WIDTH_PX;
         let mut channel = |key: &str| -> Result<Vec<[f64; 6]>, NpzError> {
             let array = npz.array_of_shape(key, &[None, None, Some(6)])?;
             let n = array.shape[0];
@@ -49,10 +80,14 @@ impl TaximTable {
                 return Err(NpzError::Array { key: key.into(), problem });
             }
             bins = n;
-            Ok(array.values.chunks_exact(6).map(|c| [c[0], c[1], c[2], c[3], c[4], c[5]]).collect())
+            let scaled = |c: &[f64]| [s * s * c[0], s * s * c[1], s * s * c[2], s * c[3], s * c[4], c[5]];
+            Ok(array.values.chunks_exact(6).map(scaled).collect())
         };
-        let (blue, green, red) = (channel("grad_r")?, channel("grad_g")?, channel("grad_b")?);
-        let rgb = [red, green, blue];
+        let (first, green, last) = (channel("grad_r")?, channel("grad_g")?, channel("grad_b")?);
+        let rgb = match reading.channels {
+            TableChannels::Bgr => [last, green, first],
+            TableChannels::Rgb => [first, green, last],
+        };
         let packed = (0..bins * bins).map(|bin| about_the_middle(&rgb, bin)).collect();
         let background = background::background(frame, CALIBRATION_WIDTH_PX);
         let offset = [0, 1, 2].map(|c| {
@@ -68,6 +103,44 @@ impl TaximTable {
             background,
             offset,
         })
+    }
+
+    /// Refuses a table of which too many values lie outside 0 to 255 on the frame, read in positions of images `width_px` wide.
+    pub(crate) fn check_scale(&self, width_px: u32, frame: &TactileImage) -> Result<(), SensorError> {
+        let share = self.share_outside(frame, 1.0);
+        if share <= MOST_OUTSIDE {
+            return Ok(());
+        }
+        let mut sides_px = vec![frame.width_px, frame.height_px];
+        sides_px.dedup();
+        let read_as = |side_px: u32| f64::from(side_px) / f64::from(width_px);
+        sides_px.retain(|&side_px| self.share_outside(frame, read_as(side_px)) <= MOST_OUTSIDE);
+        Err(SensorError::TableScale {
+            share_percent: 100.0 * share,
+            most_percent: 100.0 * MOST_OUTSIDE,
+            width_px,
+            likely_px: sides_px,
+        })
+    }
+
+    /// Share of the values of all bins and channels, at places spread over the frame, that no camera gives; `scale`: read at so many
+    /// times the positions.
+    fn share_outside(&self, frame: &TactileImage, scale: f64) -> f64 {
+        let (w, h) = (frame.width_px as usize, frame.height_px as usize);
+        let allowed = -OUTSIDE_GREY_LEVELS..=255.0 + OUTSIDE_GREY_LEVELS;
+        let mut outside = 0;
+        for place in 0..PLACES[0] * PLACES[1] {
+            let x = (2 * (place % PLACES[0]) + 1) * w / (2 * PLACES[0]);
+            let y = (2 * (place / PLACES[0]) + 1) * h / (2 * PLACES[1]);
+            let per_px = scale * CALIBRATION_WIDTH_PX / w as f64;
+            let (px, py) = (x as f64 * per_px - MIDDLE_PX[0], y as f64 * per_px - MIDDLE_PX[1]);
+            for bin in &self.packed {
+                let values = polynomial(bin, px as f32, py as f32);
+                let out = |&c: &usize| !allowed.contains(&(values[c] + self.background[c][y * w + x]));
+                outside += (0..3).filter(out).count();
+            }
+        }
+        outside as f64 / (3 * self.packed.len() * PLACES[0] * PLACES[1]) as f64
     }
 
     /// Whether all coefficients are.

@@ -33,6 +33,21 @@ pub enum SensorError {
         /// `background` or `mm_per_px`.
         missing: &'static str,
     },
+    /// A colour table whose positions are those of other images.
+    #[error(
+        "{share_percent:.0} % of the colours of the table lie outside 0 to 255 where its positions are those of images {width_px} px \
+         wide, more than {most_percent:.0} %{}", likely(.likely_px)
+    )]
+    TableScale {
+        /// Share of the values that lie outside.
+        share_percent: f64,
+        /// The largest share of a table that is read as it was made.
+        most_percent: f64,
+        /// Width of the images in whose positions it was read.
+        width_px: u32,
+        /// Widths at which fewer lie outside.
+        likely_px: Vec<u32>,
+    },
     /// The background has not the size of the rest frame that it replaces.
     #[error("the background is {found:?} pixels, the sensor's rest frame {wanted:?}")]
     BackgroundSize {
@@ -74,6 +89,15 @@ pub enum SensorError {
         /// What is allowed.
         range: &'static str,
     },
+}
+
+fn likely(widths_px: &[u32]) -> String {
+    let widths: Vec<String> = widths_px.iter().map(u32::to_string).collect();
+    if widths.is_empty() {
+        String::new()
+    } else {
+        format!("; likely is a width of {} px", widths.join(" or "))
+    }
 }
 
 /// Refuses the first of some values that does not lie in a range, which `text` tells.

@@ -19,11 +19,12 @@
 //! | `shadow_values`, `shadow_heights_mm`, `shadow_step_mm` | (N, H, L, 3), (2,), scalar, optional | shadows: change of grey level by direction, height of the gel beside the contact (first, step) and distance; NaN after the end of a ray |
 //! | `marker_px`, `marker_radius_px`, `marker_darkness_rgb` | (N, 2), scalar, (3,), optional | dots on the gel: column and row at rest, radius, share of light that a dot takes |
 //! | `ball_mm` | scalar, optional | diameter of the ball of the calibration |
+//! | `unverified` | scalar, optional | 1: it stands for a real sensor, and no press of that sensor was compared with it |
 //! | `press_gain_sd_rgb` | (3,), optional | how much the gain of each colour differs from press to press: standard deviation of its logarithm |
 
 use super::{GelShape, Pyramid, SENSOR_VERSION, Sensor, SensorError};
 use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
-use crate::colour::{ColourModel, Lambert, Regressor, TaximTable};
+use crate::colour::{ColourModel, Lambert, Regressor, TableReading, TaximTable};
 use crate::convolve::Follow;
 use crate::deform::gaussian;
 use crate::grid::{Grid, levels_of};
@@ -45,6 +46,8 @@ pub struct SensorFiles<'a> {
     pub gel_map: Option<&'a [u8]>,
     /// The bytes of a shadow table of Taxim as plain arrays.
     pub shadow_table: Option<&'a [u8]>,
+    /// How Taxim's `polycalib.npz` is read.
+    pub table: TableReading,
 }
 
 impl Sensor {
@@ -62,7 +65,15 @@ impl Sensor {
         background: Option<&TactileImage>,
     ) -> Result<Self, SensorError> {
         let (gel_map, shadow_table) = (None, None);
-        Self::from_files(&SensorFiles { sensor: bytes, metres_per_px, background, gel_map, shadow_table })
+        let table = TableReading::default();
+        Self::from_files(&SensorFiles {
+            sensor: bytes,
+            metres_per_px,
+            background,
+            gel_map,
+            shadow_table,
+            table,
+        })
     }
 
     /// Reads a sensor file and what is named beside it. A gel map and a shadow table replace those of the file.
@@ -76,7 +87,7 @@ impl Sensor {
         let mut sensor = if npz.has("gripgen_sensor") {
             Self::own(&mut npz, files.metres_per_px, files.background)?
         } else if npz.has("grad_r") {
-            Self::taxim(&mut npz, files.metres_per_px, files.background)?
+            Self::taxim(&mut npz, files)?
         } else {
             return Err(SensorError::Unknown { present: npz.keys().join(", ") });
         };
@@ -113,22 +124,20 @@ impl Sensor {
         let pyramid = pyramid(npz)?;
         let ball_m = scalar(npz, "ball_mm")?.map(|mm| mm * 1e-3);
         let press_gain_sd = triple(npz, "press_gain_sd_rgb")?;
+        let unverified = scalar(npz, "unverified")?.is_some_and(|one| one != 0.0);
         let grid = Grid { width_px, height_px, metres_per_px: metres_per_px.unwrap_or(mm_per_px * 1e-3) };
         let rest = background.map_or_else(|| planes(&rest.values), levels_of);
         let noise_rgb = [noise[0] as f32, noise[1] as f32, noise[2] as f32];
         let markers = Markers::read(npz)?;
         let plain = Self::new(grid, rest, noise_rgb, colour);
-        Ok(Self { gel_shape, markers, pyramid, ball_m, press_gain_sd, ..plain })
+        Ok(Self { gel_shape, markers, pyramid, ball_m, press_gain_sd, unverified, ..plain })
     }
 
-    fn taxim(
-        npz: &mut Npz<'_>,
-        metres_per_px: Option<f64>,
-        background: Option<&TactileImage>,
-    ) -> Result<Self, SensorError> {
-        let background = background.ok_or(SensorError::Incomplete { missing: "background" })?;
-        let metres_per_px = metres_per_px.ok_or(SensorError::Incomplete { missing: "mm_per_px" })?;
-        let table = TaximTable::read(npz, background)?;
+    fn taxim(npz: &mut Npz<'_>, files: &SensorFiles<'_>) -> Result<Self, SensorError> {
+        let background = files.background.ok_or(SensorError::Incomplete { missing: "background" })?;
+        let metres_per_px = files.metres_per_px.ok_or(SensorError::Incomplete { missing: "mm_per_px" })?;
+        let table = TaximTable::read(npz, background, files.table)?;
+        table.check_scale(files.table.width_px, background)?;
         let (width_px, height_px) = (background.width_px as usize, background.height_px as usize);
         let grid = Grid { width_px, height_px, metres_per_px };
         let colour = ColourModel::Taxim(Box::new(table));
@@ -187,6 +196,9 @@ impl Sensor {
         }
         if let Some(sd) = self.press_gain_sd {
             arrays.push(("press_gain_sd_rgb", list(sd.map(f64::from).to_vec()), ElementType::F64));
+        }
+        if self.unverified {
+            arrays.push(("unverified", scalar(1.0), ElementType::F64));
         }
         Some(write_npz(&arrays))
     }

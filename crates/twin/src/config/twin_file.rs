@@ -256,6 +256,16 @@ pub enum ImageNoise {
     Off,
 }
 
+/// Order of the channels of a colour table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TableChannels {
+    /// `grad_r` is fitted to blue, as OpenCV orders images.
+    Bgr,
+    /// `grad_r` is fitted to red.
+    Rgb,
+}
+
 /// `[optics.left]`, `[optics.right]`
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -276,6 +286,12 @@ pub struct OpticsFile {
     /// shadows where this is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shadow_table: Option<String>,
+    /// Width in pixels of the images in whose positions a `polycalib.npz` was fitted; 640, as Taxim's, where this is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table_width_px: Option<u32>,
+    /// Order of the channels of a `polycalib.npz`; `bgr`, as Taxim's, where this is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table_channels: Option<TableChannels>,
     /// Noise of the images.
     pub image_noise: ImageNoise,
 }
