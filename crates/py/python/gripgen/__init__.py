@@ -20,6 +20,7 @@ from .bags import BagSummary, read_bag
 from .dataset import Batch, Dataset, Sample, load
 from .films import Film
 from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, diagnose
+from .markers import dots
 from .policies import Staircase
 from .rendering import Rendered, render
 from .simulation import Pull, Sim
@@ -50,6 +51,7 @@ __all__ = [
     "calibrate",
     "compare",
     "diagnose",
+    "dots",
     "load",
     "read_bag",
     "render",
