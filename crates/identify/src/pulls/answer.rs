@@ -19,6 +19,7 @@ use super::power::ScoreTest;
 use super::recalibrated::recalibrated;
 use super::residual::{in_place_of_curves, kept};
 use super::ridge::{AHEAD_BY_CHANCE, ahead};
+use super::scatter::scatter as stated_scatter;
 use super::search::{Accepted, Search};
 use super::simulate::{recalibrate, trusted};
 use super::terms::Terms;
@@ -254,7 +255,9 @@ fn diagnose_with(
     }
     diagnosis.conclude();
     diagnosis.baseline = baseline(&after, &after_context);
-    if let Some((value, low90, high90)) = scattered.filter(|_| !found) {
+    // Of what was found, too: the scale of the fits is that of Student's t, which is less than the deviation that a twin draws.
+    let scattered = if found { Some(stated_scatter(&after_context, &after, &rows)) } else { scattered };
+    if let Some((value, low90, high90)) = scattered {
         diagnosis.baseline.insert("scatter".into(), ParameterEstimate::new(value, (low90, high90), "1"));
     }
     let named_rows = outliers(&after);

@@ -67,7 +67,8 @@ pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<Strin
             continue;
         }
         let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());
-        let estimate = ParameterEstimate::new(value, (value - half, value + half), unit(name));
+        // None of these can be negative.
+        let estimate = ParameterEstimate::new(value, ((value - half).max(0.0), value + half), unit(name));
         values.insert(name.clone(), estimate);
     }
     let scattered = scatter(&fitted.model, fitted.likelihood.scale);

@@ -127,7 +127,9 @@ pub(super) fn of_diagnosis(
     (pulls, parts): (usize, &[String]),
     assumed: Option<(f64, f64)>,
 ) -> Posterior {
-    let unnamed = if accepted.curves.is_empty() { "none" } else { "unknown" };
+    // A shape that goes with a column, or what was learnt of the residual.
+    let unknown = !accepted.curves.is_empty() || diagnosis.residual.is_some();
+    let unnamed = if unknown { "unknown" } else { "none" };
     let mut causes: Vec<(f64, String, &Fitted)> = vec![(1.0, cause_of(&after.model, unnamed), after)];
     // Entries of the diagnosis are not in the order of the terms: rivals are found by their names.
     for tied in accepted.effects.iter().flat_map(|(_, tied)| tied) {
@@ -136,7 +138,7 @@ pub(super) fn of_diagnosis(
             rival_odds(diagnosis, after, &tied.fitted).unwrap_or_else(|| libm::exp(TEMPER * tied.less));
         causes.push((odds, cause, &tied.fitted));
     }
-    if !accepted.effects.is_empty() || !accepted.curves.is_empty() {
+    if !accepted.effects.is_empty() || unknown {
         let less = after.score(pulls) - before.score(pulls);
         causes.push((libm::exp(-TEMPER * less.max(0.0)), "none".into(), before));
     }
