@@ -57,7 +57,8 @@ def test_what_is_read_is_what_png_stores(run, clean):
     streamed = np.concatenate([b for b, _ in gg.stream(CONFIG, set={**SMALL, "images": "clean"})])
     assert streamed.tobytes() == noisy.batch(range(len(noisy)))[0].tobytes()
     size = [sum(p.stat().st_size for p in path.glob("shard-*.mcap")) for path in (clean, run)]
-    assert size[0] < 0.6 * size[1], size
+    # Without noise the texture of a real frame at rest is left: 0.66. Of the invented sensor it was below 0.6.
+    assert size[0] < 0.7 * size[1], size
 
 
 def test_stock_readers_see_clean_frames_and_how_to_add_the_noise(run, clean, quiet):

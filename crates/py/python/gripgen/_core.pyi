@@ -141,6 +141,7 @@ def render(
     y_px: float | None = None,
     rotation_deg: float = 0.0,
     scale_mm_per_unit: float | None = None,
+    edge_radius_mm: float | None = None,
 ) -> dict[str, Any]: ...
 def rig_check(
     config: str,

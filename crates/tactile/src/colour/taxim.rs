@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 /// Width in pixels of the images on which Taxim's tables are calibrated; the polynomials use their coordinates.
 const CALIBRATION_WIDTH_PX: f64 = 640.0;
 
-/// A channel that leaves 0 to 255 by more grey levels than this is none of a camera.
+/// No camera gives a channel that leaves 0 to 255 by more grey levels than this.
 const OUTSIDE_GREY_LEVELS: f32 = 10.0;
 /// The largest share of such values in a table that is read in the positions in which it was made. Eight public tables have 0.0 to
 /// 1.7 % there; the three made of narrower images have 12 to 62 % where they are read as 640 px wide.
@@ -123,8 +123,8 @@ impl TaximTable {
         })
     }
 
-    /// Share of the values of all bins and channels, at places spread over the frame, that no camera gives; `scale`: read at so many
-    /// times the positions.
+    /// Share of the values of all bins and channels, at places spread over the frame, that no camera gives; `scale` multiplies the
+    /// positions first.
     fn share_outside(&self, frame: &TactileImage, scale: f64) -> f64 {
         let (w, h) = (frame.width_px as usize, frame.height_px as usize);
         let allowed = -OUTSIDE_GREY_LEVELS..=255.0 + OUTSIDE_GREY_LEVELS;

@@ -146,7 +146,7 @@ mod tests {
         [shares.plane(whole), depths.plane(whole)]
     }
 
-    /// The core of a ball is a disc: its area is that of the circle to a hundredth of what whole pixels miss it by.
+    /// The core of a ball is a disc: its area is that of the circle to a thousandth; whole pixels miss it by three times as much or more.
     #[test]
     fn the_core_of_a_ball_has_the_area_of_its_circle() {
         let (radius, press, core_px) = (40.0f64, 8.0, 3.2);

@@ -45,7 +45,7 @@ pub enum SensorError {
         most_percent: f64,
         /// Width of the images in whose positions it was read.
         width_px: u32,
-        /// Widths at which fewer lie outside.
+        /// Widths at which the share is small enough.
         likely_px: Vec<u32>,
     },
     /// The background has not the size of the rest frame that it replaces.
