@@ -55,6 +55,7 @@ all presses, so the start knows the presses; what is added here does not.\n";
 
 fn plain(set: &PressSet, table: &[u8], gel_map: Option<&[u8]>) -> Result<Sensor, Box<dyn Error>> {
     Ok(Sensor::from_files(&SensorFiles {
+        table: Default::default(),
         sensor: table,
         metres_per_px: Some(set.metres_per_px),
         background: set.rest.as_ref(),

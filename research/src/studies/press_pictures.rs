@@ -8,8 +8,8 @@ use crate::{StudyResult, arguments};
 use gripgen::record::encode_png;
 use gripgen::tactile::Sensor;
 use gripgen::tactile::presses::{
-    CalibrateOptions, Indenter, IndenterPose, PressSet, calibrate_presses, compare_presses, predict_press,
-    render_body,
+    CalibrateOptions, Indenter, IndenterPose, PressSet, USUAL_EDGE_RADIUS_M, calibrate_presses,
+    compare_presses, predict_press, render_body,
 };
 use gripgen::twin::{TactileImage, TriMesh};
 use gripgen_cli::{PressGeometry, load_presses};
@@ -95,6 +95,7 @@ fn shapes(sensor: &Sensor) -> Vec<Vec<Tile>> {
     let draw = |mesh: &TriMesh, depth_mm: f64| {
         let at = IndenterPose { x_px: middle.0, y_px: middle.1, rotation_rad: 0.3 };
         let body = Indenter::of_mesh("body", mesh, at, depth_mm * 1e-3, grid).expect("a body that is seen");
+        let body = body.with_edge_radius(USUAL_EDGE_RADIUS_M, grid);
         tile(&render_body(&Arc::new(body), sensor).image, middle)
     };
     [block, ridge].iter().map(|mesh| DEPTHS_MM.iter().map(|depth| draw(mesh, *depth)).collect()).collect()
