@@ -67,8 +67,9 @@ pub(super) fn baseline(fitted: &Fitted, context: &Context<'_>) -> BTreeMap<Strin
             continue;
         }
         let (value, half) = (fitted.values[k], HALF90 * fitted.covariance[(k, k)].max(0.0).sqrt());
-        // None of these can be negative.
-        let estimate = ParameterEstimate::new(value, ((value - half).max(0.0), value + half), unit(name));
+        // None of these can be negative, and an interval holds its value.
+        let low = (value - half).max(value.min(0.0));
+        let estimate = ParameterEstimate::new(value, (low, value + half), unit(name));
         values.insert(name.clone(), estimate);
     }
     let scattered = scatter(&fitted.model, fitted.likelihood.scale);

@@ -21,7 +21,7 @@ const OUTSIDE_GREY_LEVELS: f32 = 10.0;
 /// The largest share of such values in a table that is read in the positions in which it was made. Eight public tables have 0.0 to
 /// 1.7 % there; the three made of narrower images have 12 to 62 % where they are read as 640 px wide.
 const MOST_OUTSIDE: f64 = 0.05;
-/// Places along each axis of the image at which that is looked at.
+/// Places along each axis of the image at which that is counted.
 const PLACES: [usize; 2] = [8, 6];
 
 /// How a `polycalib.npz` is read: what its arrays do not say.

@@ -52,8 +52,8 @@ impl EdgePixel {
     }
 }
 
-/// Writes the share of each pixel that belongs to the core and the depth there, both 0 outside it, in whole groups around `area`,
-/// which holds the contact.
+/// Writes the share of each pixel that belongs to the core, 0 outside it, and the depth there, in whole groups around `area`, which
+/// holds the contact.
 pub(super) fn write_core(
     depth_px: &Plane,
     edges: &Edges,
@@ -183,7 +183,7 @@ mod tests {
             }
         });
         let mut edges = Edges::default();
-        // A third of column 4 lies 6 px deep, the rest beside the part.
+        // A third of column 4 lies 6 px deep, the rest next to the part.
         (0..9).for_each(|y| edges.push(9 * y + 4, 1.0, [6.0, 0.0, 0.0, 6.0, 0.0, 0.0, 6.0, 0.0, 0.0]));
         let [shares, depths] = core(&depth, &edges, 2.4);
         assert_eq!((shares.at(3, 4), depths.at(3, 4)), (1.0, 6.0));
