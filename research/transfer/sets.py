@@ -3,6 +3,7 @@
 `GRIPGEN_BIN` names the program. Priors and twin are those inside the program. A sweep that is there is not made again.
 """
 
+import functools
 import io
 import os
 import re
@@ -51,9 +52,9 @@ def test_twin(work: Path) -> Path:
 
 def configuration(name: str, work: Path) -> tuple[Path, list[str]]:
     """File and overrides of a set: one of NAMES, `w1` (the test) or `w1-native` (made for W1 alone)."""
-    sets = ["images.storage=clean", "images.compression=small"]
+    sets = ["images.storage=clean"]
     if name == "old":
-        return ROOT / "research" / "transfer" / "large.toml", sets
+        return ROOT / "research" / "transfer" / "large.toml", [*sets, "images.compression=small"]
     text = (CONFIGS / "training.toml").read_text()
     twin = "asset:configs/twin-training.toml"
     if name.startswith("w1"):
@@ -86,11 +87,19 @@ def made(name: str, work: Path, samples: int) -> Samples:
     return found
 
 
-def change_of(png: bytes, base: np.ndarray) -> np.ndarray:
-    """Change from the frame at rest: stored frames hold (frame - rest + mean of the row) mod 256."""
+@functools.cache
+def rest_of(sensor: str) -> np.ndarray:
+    """The frame at rest of a shipped sensor, in whole grey levels."""
+    with np.load(ROOT / "assets" / sensor.removeprefix("asset:")) as file:
+        return np.round(file["rest_rgb"]).astype(np.int16)
+
+
+def change_of(png: bytes, base: np.ndarray, whole: bool) -> np.ndarray:
+    """Change from the frame at rest, which `base` is for `whole` frames; others hold (frame - rest + mean of the row) mod 256, and `base` is that mean."""
     stored = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=np.int16)
-    change = stored - base
-    change = np.where(change > 127, change - 256, np.where(change < -128, change + 256, change)).astype(np.float32)
+    change = (stored - base).astype(np.float32)
+    if not whole:
+        change = np.where(change > 127, change - 256, np.where(change < -128, change + 256, change))
     return change.reshape(VIEW[0], SHRINK, VIEW[1], SHRINK, 3).mean((1, 3))
 
 
@@ -121,7 +130,8 @@ def read(run: Path, rig_key: str = "") -> Samples:
                 continue
             at = (sample.timestamp.seconds, sample.timestamp.nanos)
             seed = np.random.default_rng([sample.index, 5])
-            both = np.stack([change_of(frames[jaw][at], base[jaw]) for jaw in ("left", "right")])
+            sensors = {jaw: sample.drawn_text.get(f"optics.{jaw}.sensor") for jaw in ("left", "right")}
+            both = np.stack([change_of(frames[jaw][at], rest_of(s) if s else base[jaw], s is not None) for jaw, s in sensors.items()])
             sd = [[getattr(n, c) for c in ("red", "green", "blue")] for n in (sample.left_image_noise, sample.right_image_noise)]
             both += seed.standard_normal(both.shape) * np.array(sd)[:, None, None, :] / SHRINK
             columns["change"].append(both.astype(np.float16))

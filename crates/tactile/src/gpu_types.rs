@@ -110,14 +110,13 @@ pub(crate) fn missing(sensor: &Sensor, gel: &Gel) -> Option<&'static str> {
     match gel.model {
         GelModel::Elastic => Some("an elastic gel"),
         _ if gel.stiffens => Some("a gel that stiffens"),
-        // Markers on a gel of unknown modulus stay where they are.
-        _ if sensor.markers.is_some() && gel.elastic.is_some() => Some("markers"),
+        _ if sensor.markers.is_some() => Some("markers"),
         _ => None,
     }
 }
 
 /// Whether a device makes the images of a sensor with its gel. Those of an elastic gel, and of one that stiffens, are the processor's,
-/// which solves the contact for the labels in any case; so are those of markers that move, which have no twin here yet.
+/// which solves the contact for the labels in any case; so are those of a gel with markers, which have no twin here yet.
 pub fn makes(sensor: &Sensor, gel: &Gel) -> bool {
     missing(sensor, gel).is_none()
 }

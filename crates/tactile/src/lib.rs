@@ -74,8 +74,8 @@ pub use gradient::gradient;
 pub use grid::{Grid, Plane};
 pub use indent::{ElasticField, Imprint, IndentError, PressedGel, indent};
 pub use markers::{
-    MarkerGel, Markers, Shear, draw_markers, marker_displacements, marker_displacements_by_cell,
-    print_markers, without_markers,
+    Dot, MarkerGel, Markers, Shear, draw_markers, find_dots, follow_dots, marker_displacements,
+    marker_displacements_by_cell, marker_displacements_by_surface, print_markers, without_markers,
 };
 pub use noise::finish;
 pub use patch::{CellMap, CellPlaces};

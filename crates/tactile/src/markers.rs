@@ -2,10 +2,13 @@
 //!
 //! A contact moves the surface of the gel in its plane: a pressed gel gives way sideways, a pulled one follows. Each
 //! cell of the contact patch moves every marker by the displacement of an elastic layer on a rigid base under a
-//! normal and a tangential force (see `docs/decisions/0007-markers-by-layer-greens-functions.md`).
+//! normal and a tangential force (see `docs/decisions/0007-markers-by-layer-greens-functions.md`). Where the modulus of the gel is not
+//! known they go with its surface: [`marker_displacements_by_surface`].
 
+mod find;
 mod green;
 
+pub use find::{Dot, find_dots, follow_dots};
 pub use green::MarkerGel;
 
 use crate::grid::{Grid, Plane};
@@ -159,6 +162,38 @@ pub fn marker_displacements_by_cell(
         }
     }
     moved
+}
+
+/// How far the dots lie from the part of the skin that only bends: 2.5 px of 0.063 mm, fitted to a GelSight Mini with dots, 26 presses of a
+/// ball (yepengfei81-cpu/gelsight_gripper_controller, 2026).
+const DOT_LEVER_M: f64 = 0.16e-3;
+
+/// Displacement of each marker in pixels where the surface of the gel is known and not its modulus: `u = s h - L grad h`.
+///
+/// h is the height of the surface towards the camera, in pixels. Where the skin is tilted, what lies at the distance L from it moves aside;
+/// `shear` is s, the sideways displacement of the surface for each pixel of height. Of the displacements of real dots under a ball the tilt
+/// explains a tenth, and both two thirds (`shear` fitted to each press).
+pub fn marker_displacements_by_surface(
+    surface_px: &Plane,
+    metres_per_px: f64,
+    shear: [f64; 2],
+    rest_px: &[[f64; 2]],
+) -> Vec<[f64; 2]> {
+    let lever_px = DOT_LEVER_M / metres_per_px;
+    let moved = |(height, slope): (f64, [f64; 2])| [0, 1].map(|a| shear[a] * height - lever_px * slope[a]);
+    rest_px.iter().map(|&at| moved(height_and_slope(surface_px, at))).collect()
+}
+
+/// Height and slope of a surface at the pixel that is nearest to a point; 0 outside of it.
+pub(crate) fn height_and_slope(surface_px: &Plane, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
+    let (x, y) = (x.round(), y.round());
+    let inside = |v: f64, n: usize| v >= 1.0 && v + 1.0 < n as f64;
+    if !inside(x, surface_px.width) || !inside(y, surface_px.height) {
+        return (0.0, [0.0; 2]);
+    }
+    let (x, y) = (x as usize, y as usize);
+    let at = |x: usize, y: usize| f64::from(surface_px.at(x, y));
+    (at(x, y), [(at(x + 1, y) - at(x - 1, y)) / 2.0, (at(x, y + 1) - at(x, y - 1)) / 2.0])
 }
 
 /// The rest frame without its markers: each is filled with the mean of a ring around it.

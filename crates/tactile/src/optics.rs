@@ -99,7 +99,7 @@ impl Renderer<'_> {
     ) -> ([Plane; 3], Vec<[f64; 2]>) {
         let mut markers_px = Vec::new();
         let mut change = self.contact_seen(imprint, optics, |change| {
-            markers_px = self.mark_by_cell(patch, tangential_n, change);
+            markers_px = self.mark_by_cell(imprint, patch, tangential_n, change);
         });
         if optics.changes_frame() {
             camera::apply(optics, &self.sensor.grid, &self.sensor.rest, &mut change);

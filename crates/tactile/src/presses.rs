@@ -7,6 +7,7 @@ mod compare;
 mod contact;
 mod coverage;
 mod data_pack;
+mod dots;
 mod gain;
 mod indenter;
 mod render;
@@ -19,7 +20,7 @@ pub use calibrate::{
 };
 pub use circle::{find_circle, reference_frame};
 pub use compare::{
-    CROPS_PX, CompareError, PressComparison, PressScore, Scores, WINDOW_PX, compare_presses, crop,
+    CROPS_PX, CompareError, DotPlace, PressComparison, PressScore, Scores, WINDOW_PX, compare_presses, crop,
     predict_press, score_press,
 };
 pub use coverage::{PARTS, PressCoverage, RIM_M, SEEN_SHARE, press_coverage};
@@ -64,18 +65,27 @@ pub struct Press {
     pub travel_m: Option<f64>,
     /// The body, where it is no ball.
     pub indenter: Option<Arc<Indenter>>,
+    /// Which pixels dots of the gel hide, row by row; see [`PressSet::mark_dots`].
+    pub hidden: Option<Arc<[bool]>>,
 }
 
 impl Press {
     /// A press of a ball; `circle` where somebody marked it.
     pub fn of_ball(name: impl Into<String>, image: TactileImage, circle: Option<Circle>) -> Self {
-        Self { name: name.into(), image, circle, travel_m: None, indenter: None }
+        Self { name: name.into(), image, circle, travel_m: None, indenter: None, hidden: None }
     }
 
     /// A press of another body.
     pub fn of_body(name: impl Into<String>, image: TactileImage, indenter: Arc<Indenter>) -> Self {
         let circle = Some(indenter.circle());
-        Self { name: name.into(), image, circle, travel_m: Some(indenter.travel_m), indenter: Some(indenter) }
+        Self {
+            name: name.into(),
+            image,
+            circle,
+            travel_m: Some(indenter.travel_m),
+            indenter: Some(indenter),
+            hidden: None,
+        }
     }
 
     /// What was pressed in, as reports call it.

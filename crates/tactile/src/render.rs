@@ -11,7 +11,8 @@ use crate::grid::Plane;
 use crate::indent::press::Press;
 use crate::indent::{Imprint, IndentError};
 use crate::markers::{
-    MarkerGel, Shear, draw_markers, marker_displacements, marker_displacements_by_cell, without_markers,
+    MarkerGel, Shear, draw_markers, marker_displacements, marker_displacements_by_cell,
+    marker_displacements_by_surface, without_markers,
 };
 use crate::noise::finish_on;
 use crate::raster::ClusteredMesh;
@@ -102,8 +103,7 @@ impl Renderer<'_> {
         self.change_under_shear(imprint, &Shear::default())
     }
 
-    /// The same while the part also pulls sideways: stage `markers`, of sensors that have them and gels whose modulus
-    /// is known.
+    /// The same while the part also pulls sideways: stage `markers`, of sensors that have them.
     pub fn change_under_shear(&self, imprint: &Imprint, shear: &Shear) -> [Plane; 3] {
         let mut change = self.unmarked_change(imprint);
         self.mark(imprint, shear, &mut change);
@@ -111,30 +111,57 @@ impl Renderer<'_> {
     }
 
     /// Moves the markers as the cells of a patch pull at the gel, each with its force along image x and y. Returns where
-    /// they are; empty where there are none, or the modulus of the gel is not known.
+    /// they are; empty where there are none.
     pub(crate) fn mark_by_cell(
         &self,
+        imprint: &Imprint,
         patch: &ContactPatch,
         tangential_n: &[[f64; 2]],
         change: &mut [Plane; 3],
     ) -> Vec<[f64; 2]> {
-        let (Some(markers), Some(elastic)) = (&self.sensor.markers, self.gel.elastic) else { return vec![] };
-        let Sensor { grid, rest, .. } = self.sensor;
-        let gel = MarkerGel::new(self.gel.thickness_m, elastic.young_modulus_pa, elastic.poisson_ratio, 0.0);
-        let moved = marker_displacements_by_cell(&gel, patch, tangential_n, grid, &markers.rest_px);
-        draw_markers(markers, &moved, &without_markers(rest, grid, markers), change);
+        let Sensor { grid, markers: Some(markers), .. } = self.sensor else { return vec![] };
+        let moved = match self.marker_gel() {
+            Some(gel) => marker_displacements_by_cell(&gel, patch, tangential_n, grid, &markers.rest_px),
+            None => {
+                let sum = |a: usize| tangential_n.iter().map(|force| force[a]).sum();
+                self.moved_by_surface(imprint, [sum(0), sum(1)], &markers.rest_px)
+            }
+        };
+        self.draw_moved(&moved, change);
         markers.rest_px.iter().zip(&moved).map(|(at, by)| [at[0] + by[0], at[1] + by[1]]).collect()
     }
 
     /// The stage `markers`.
     pub(crate) fn mark(&self, imprint: &Imprint, shear: &Shear, change: &mut [Plane; 3]) {
-        if let (Some(markers), Some(elastic)) = (&self.sensor.markers, self.gel.elastic) {
-            let Sensor { grid, rest, .. } = self.sensor;
-            let gel =
-                MarkerGel::new(self.gel.thickness_m, elastic.young_modulus_pa, elastic.poisson_ratio, 0.0);
-            let moved = marker_displacements(&gel, &imprint.patch, shear, grid, &markers.rest_px);
-            draw_markers(markers, &moved, &without_markers(rest, grid, markers), change);
+        let Sensor { grid, markers: Some(markers), .. } = self.sensor else { return };
+        let moved = match self.marker_gel() {
+            Some(gel) => marker_displacements(&gel, &imprint.patch, shear, grid, &markers.rest_px),
+            None => self.moved_by_surface(imprint, shear.force_n, &markers.rest_px),
+        };
+        self.draw_moved(&moved, change);
+    }
+
+    /// Moves the markers of the sensor, if it has any.
+    pub(crate) fn draw_moved(&self, moved_px: &[[f64; 2]], change: &mut [Plane; 3]) {
+        let Sensor { grid, rest, markers, .. } = self.sensor;
+        if let Some(markers) = markers {
+            draw_markers(markers, moved_px, &without_markers(rest, grid, markers), change);
         }
+    }
+
+    /// The gel as markers know it, where its modulus is known.
+    fn marker_gel(&self) -> Option<MarkerGel> {
+        let elastic = self.gel.elastic?;
+        Some(MarkerGel::new(self.gel.thickness_m, elastic.young_modulus_pa, elastic.poisson_ratio, 0.0))
+    }
+
+    /// Displacements of markers by the surface of the gel, which a force takes along by its shear stiffness where it is highest.
+    fn moved_by_surface(&self, imprint: &Imprint, force_n: [f64; 2], rest_px: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let surface = self.surface(imprint);
+        let (highest_px, metres_per_px) = (f64::from(surface.highest()), self.sensor.grid.metres_per_px);
+        let stiffness = self.gel.shear_stiffness_n_per_m * metres_per_px * highest_px;
+        let shear = force_n.map(|force| if stiffness > 0.0 { force / stiffness } else { 0.0 });
+        marker_displacements_by_surface(&surface, metres_per_px, shear, rest_px)
     }
 
     /// The stages `deform` to `shadow`.

@@ -103,6 +103,13 @@ fn warn(calibration: &Calibration, presses: usize, talk: &TalkArgs) {
             "warning: {n} of {presses} marks show no contact; either they are wrong, or contacts are hardly visible on this sensor"
         );
     }
+    if let Some(markers) = &calibration.sensor.markers {
+        eprintln!(
+            "note: the gel has {} dots of {:.2} mm; the fit leaves out what they hide, and errors are given outside and in them",
+            markers.rest_px.len(),
+            2e3 * markers.radius_px * calibration.sensor.grid.metres_per_px
+        );
+    }
     if presses < FEW_PRESSES {
         eprintln!(
             "warning: {presses} presses are few: elsewhere on the gel the error may be twice the one below"
@@ -260,6 +267,11 @@ fn fitted(sensor: &Sensor) -> Value {
         "sink_in_fraction": sensor.pyramid.as_ref().map(|p| p.sink_in_fraction),
         "kernels_px": sensor.pyramid.as_ref().map(|p| p.kernels_px.clone()),
         "press_gain_sd_rgb": sensor.press_gain_sd,
+        "dots": sensor.markers.as_ref().map(|markers| json!({
+            "n": markers.rest_px.len(),
+            "radius_px": markers.radius_px,
+            "darkness_rgb": markers.darkness_rgb,
+        })),
     })
 }
 

@@ -297,6 +297,10 @@ pub fn comparison_json(comparison: &PressComparison) -> Value {
     all["by_shape"] = Value::Object(shapes.collect());
     let zones = comparison.by_zone.iter().map(|(zone, n, score)| named((zone.name(), *n, score)));
     all["by_zone"] = Value::Object(zones.collect());
+    if !comparison.by_dots.is_empty() {
+        let places = comparison.by_dots.iter().map(|(place, n, score)| named((place.name(), *n, score)));
+        all["by_dots"] = Value::Object(places.collect());
+    }
     all
 }
 
@@ -330,5 +334,6 @@ pub fn table(comparison: &PressComparison) -> String {
             row(&format!("  {shape} ({n})"), score);
         }
     }
+    comparison.by_dots.iter().for_each(|(place, _, score)| row(place.name(), score));
     text
 }

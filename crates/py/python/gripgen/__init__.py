@@ -20,9 +20,8 @@ from .bags import BagSummary, read_bag
 from .dataset import Batch, Dataset, Sample, load
 from .films import Film
 from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, diagnose
-from .markers import dots
 from .policies import Staircase
-from .rendering import Rendered, render
+from .rendering import Rendered, dots, render
 from .simulation import Pull, Sim
 from .streams import FilmBatch, Stream, StreamBatch, stream
 from .sweeps import SweepSummary, sweep

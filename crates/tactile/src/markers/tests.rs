@@ -218,3 +218,48 @@ fn markers_of_a_sensor_file_are_read_and_moved() {
     let unmarked = Renderer { sensor: &plain, ..renderer };
     assert!(unmarked.change(&imprint)[0].values.iter().all(|&v| v == 0.0));
 }
+
+/// A ramp of slope 1/4 moves its dots down by a quarter of the lever; a surface that is dragged takes them along by its height.
+#[test]
+fn dots_go_with_the_tilt_and_the_shear_of_the_surface() {
+    let ramp = Plane::from_fn(40, 30, |x, _| 0.25 * x as f32);
+    let at = [[20.0, 15.0], [8.0, 4.0], [200.0, 4.0]];
+    let tilted = marker_displacements_by_surface(&ramp, 0.04e-3, [0.0; 2], &at);
+    assert!((tilted[0][0] + 0.25 * 4.0).abs() < 1e-9 && tilted[0][1] == 0.0, "{tilted:?}");
+    let dragged = marker_displacements_by_surface(&ramp, 0.04e-3, [0.0, 0.5], &at);
+    assert!((dragged[1][1] - 0.5 * 2.0).abs() < 1e-9 && dragged[1][0] == tilted[1][0], "{dragged:?}");
+    assert_eq!(dragged[2], [0.0; 2], "outside of the image nothing is known");
+}
+
+/// Dots drawn into a frame, dimmed by 0.7 and 2.5 px wide, are measured as they were drawn.
+#[test]
+fn the_dots_of_a_frame_are_measured() {
+    let grid = Grid { width_px: 160, height_px: 120, metres_per_px: 1e-4 };
+    let drawn = Markers::regular(&grid, 6, 5, 22.3, 2.6, [0.7, 0.6, 0.8]);
+    let mut rest = [120.0f32, 90.0, 60.0].map(|level| {
+        let plane = Plane::from_fn(160, 120, |x, y| level + 0.1 * x as f32 - 0.05 * y as f32);
+        plane.values
+    });
+    assert_eq!(Markers::of_rest(&rest, &grid), None, "a frame without dots has none");
+    print_markers(&mut rest, &grid, &drawn);
+    let found = Markers::of_rest(&rest, &grid).unwrap();
+    assert_eq!(found.rest_px.len(), 30);
+    for (found, drawn) in found.rest_px.iter().zip(&drawn.rest_px) {
+        assert!((found[0] - drawn[0]).hypot(found[1] - drawn[1]) < 0.15, "{found:?} {drawn:?}");
+    }
+    assert!((found.radius_px - 2.6).abs() < 0.15, "{}", found.radius_px);
+    for (found, drawn) in found.darkness_rgb.iter().zip(drawn.darkness_rgb) {
+        assert!((found - drawn).abs() < 0.05, "{found} {drawn}");
+    }
+    // Each moved by up to 9 px, one gone: nobody takes its neighbour's place.
+    let by = |i: usize| [(i as f64 * 2.4).sin() * 9.0, (i as f64 * 1.7).cos() * 9.0];
+    let dot = |i: usize| Dot {
+        centre_px: [drawn.rest_px[i][0] + by(i)[0], drawn.rest_px[i][1] + by(i)[1]],
+        pixels: vec![],
+    };
+    let moved: Vec<Dot> = (0..30).filter(|&i| i != 13).map(dot).collect();
+    let followed = follow_dots(&moved, &drawn.rest_px);
+    for (i, at) in followed.iter().enumerate() {
+        assert_eq!(*at, (i != 13).then_some(if i < 13 { i } else { i - 1 }));
+    }
+}

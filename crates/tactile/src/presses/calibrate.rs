@@ -21,6 +21,7 @@ use crate::colour::regressor::{AROUND_FITTED, AROUND_HEIGHTS, SURROUNDINGS};
 use crate::colour::{ColourModel, Regressor, shade};
 use crate::gradient::gradient;
 use crate::grid::Grid;
+use crate::markers::Markers;
 use crate::metrics::MetricError;
 use crate::sensor::{GelShape, Sensor};
 use gel::{Candidate, Gels};
@@ -133,21 +134,20 @@ pub enum CalibrateError {
 /// Where each press has a gain of its own (an automatic white balance), it is taken from the pixels away from the contact and
 /// divided out; of a press held out too, of which nothing else is looked at.
 ///
-/// Contacts that nobody marked are looked for.
+/// Contacts that nobody marked are looked for, and so are dots on the gel, which no fit looks at.
 pub fn calibrate_presses(set: &PressSet, options: &CalibrateOptions) -> Result<Calibration, CalibrateError> {
     let grid = check(set)?;
-    if set.presses.iter().any(|press| press.circle.is_none()) {
-        let mut marked = set.clone();
-        marked.mark_missing();
-        return calibrate_marked(&marked, options, grid);
-    }
-    calibrate_marked(set, options, grid)
+    let mut marked = set.clone();
+    marked.mark_missing();
+    let dotted = marked.mark_dots().is_some();
+    calibrate_marked(&marked, options, grid, dotted)
 }
 
 fn calibrate_marked(
     set: &PressSet,
     options: &CalibrateOptions,
     grid: Grid,
+    dotted: bool,
 ) -> Result<Calibration, CalibrateError> {
     let marked = set
         .presses
@@ -162,7 +162,7 @@ fn calibrate_marked(
     let (trusted, distrusted) = trusted(set, &marked)?;
     let gels = Gels::new(options.gel_shape.as_ref(), &marked, set.ball_m, grid);
     let press_gain_sd = gains.as_ref().map(|gains| gains.sd);
-    let fit = Fit { set, grid, marked: &marked, press_gain_sd };
+    let fit = Fit { set, grid, marked: &marked, press_gain_sd, dotted };
 
     let usual = if marked.len() < FEW_PRESSES { marked.len() } else { 4 };
     let folds = options.folds.unwrap_or(usual).clamp(2, marked.len());
@@ -214,6 +214,8 @@ struct Fit<'a> {
     grid: Grid,
     marked: &'a [Marked<'a>],
     press_gain_sd: Option<[f32; 3]>,
+    /// Whether the gel has dots.
+    dotted: bool,
 }
 
 impl Fit<'_> {
@@ -247,7 +249,9 @@ impl Fit<'_> {
         // A 64th of a grey level is far below the noise, and packs well.
         rest.iter_mut().flatten().for_each(|v| *v = (*v * 64.0).round() / 64.0);
         let noise_rgb = noise_rgb(&presses, &rest, &self.grid);
+        let markers = Markers::of_rest(&rest, &self.grid).filter(|_| self.dotted);
         Ok(Sensor {
+            markers,
             gel_shape: candidate.gel.shape.clone(),
             pyramid: Some(candidate.gel.pyramid.clone()),
             ball_m: Some(self.set.ball_m),

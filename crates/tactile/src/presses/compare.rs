@@ -1,6 +1,7 @@
 //! A sensor file against presses: predicted and real image of each.
 
 use super::contact::{MarkError, ZONES, Zone, checked};
+use super::dots::predict_dotted;
 use super::gain::within_gain;
 use super::{Contact, Press, PressSet};
 use crate::convolve::Follow;
@@ -66,6 +67,37 @@ pub struct PressScore {
     pub scores: Scores,
     /// The same by zone around the contact, of those that the image has.
     pub zones: Vec<(Zone, Score)>,
+    /// The same by [`DotPlace`], of those that the image has; empty of a gel without dots.
+    pub dots: Vec<(DotPlace, Score)>,
+}
+
+/// A part of an image of a gel with dots. Pixels that a dot hides at rest or in the press lie in dots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DotPlace {
+    /// Inside the rim of the contact, or in the whole frame.
+    pub in_contact: bool,
+    /// In dots, or outside of them.
+    pub in_dots: bool,
+}
+
+/// All places, the whole frame first.
+const DOT_PLACES: [DotPlace; 4] = [
+    DotPlace { in_contact: false, in_dots: false },
+    DotPlace { in_contact: false, in_dots: true },
+    DotPlace { in_contact: true, in_dots: false },
+    DotPlace { in_contact: true, in_dots: true },
+];
+
+impl DotPlace {
+    /// Name for people and for `--json`.
+    pub fn name(self) -> &'static str {
+        match (self.in_contact, self.in_dots) {
+            (false, false) => "frame, outside dots",
+            (false, true) => "frame, in dots",
+            (true, false) => "contact, outside dots",
+            (true, true) => "contact, in dots",
+        }
+    }
 }
 
 /// All presses.
@@ -79,6 +111,8 @@ pub struct PressComparison {
     pub by_shape: Vec<(String, usize, Score)>,
     /// By zone around the contact: how many presses have it, and the mean over them.
     pub by_zone: Vec<(Zone, usize, Score)>,
+    /// The same by where dots are; empty of a gel without dots.
+    pub by_dots: Vec<(DotPlace, usize, Score)>,
 }
 
 impl PressComparison {
@@ -114,7 +148,13 @@ impl PressComparison {
             (zone, scores.len(), mean_score(&scores))
         };
         let by_zone = ZONES.into_iter().map(of_zone).filter(|(_, n, _)| *n > 0).collect();
-        Some(Self { mean, each, by_shape, by_zone })
+        let of_place = |place: DotPlace| {
+            let there = each.iter().flat_map(|press| &press.dots).filter(|(p, _)| *p == place);
+            let scores: Vec<Score> = there.map(|(_, score)| *score).collect();
+            (place, scores.len(), mean_score(&scores))
+        };
+        let by_dots = DOT_PLACES.into_iter().map(of_place).filter(|(_, n, _)| *n > 0).collect();
+        Some(Self { mean, each, by_shape, by_zone, by_dots })
     }
 }
 
@@ -125,11 +165,11 @@ impl PressComparison {
 ///
 /// A set without presses, images of another size than those of the sensor, or a press without a valid mark.
 pub fn compare_presses(set: &PressSet, sensor: &Sensor) -> Result<PressComparison, CompareError> {
-    let mut completed = None;
-    if set.presses.iter().any(|press| press.circle.is_none()) {
-        completed.insert(set.clone()).mark_missing();
+    let mut set = set.clone();
+    set.mark_missing();
+    if let Some(markers) = &sensor.markers {
+        set.hide_dots(markers);
     }
-    let set = completed.as_ref().unwrap_or(set);
     let mut each = Vec::with_capacity(set.presses.len());
     for press in &set.presses {
         let predicted = predict_press(press, set.ball_m, sensor)?;
@@ -156,7 +196,10 @@ pub fn predict_press(press: &Press, ball_m: f64, sensor: &Sensor) -> Result<Tact
 
 /// The image of a contact in the gain with which a press was taken, where the camera's gain wanders.
 pub(super) fn predict_taken(press: &Press, contact: &Contact, ball_m: f64, sensor: &Sensor) -> TactileImage {
-    let image = predict_contact(contact, ball_m, sensor);
+    let image = match &sensor.markers {
+        Some(markers) => predict_dotted(&press.image, contact, ball_m, sensor, markers),
+        None => predict_contact(contact, ball_m, sensor),
+    };
     match sensor.press_gain_sd {
         Some(sd) => within_gain(&press.image, &image, contact, &sensor.grid, sd.map(f64::from)),
         None => image,
@@ -221,7 +264,7 @@ pub fn score_press(press: &Press, predicted: &TactileImage) -> Result<PressScore
         crop200: cropped(CROPS_PX[1])?,
         window: cropped(WINDOW_PX)?,
     };
-    let mut zones = Vec::new();
+    let (mut zones, mut dots) = (Vec::new(), Vec::new());
     if let Some(circle) = press.circle {
         let contact = Contact::of_press(press, circle);
         let width_px = predicted.width_px as usize;
@@ -232,8 +275,13 @@ pub fn score_press(press: &Press, predicted: &TactileImage) -> Result<PressScore
             let found = score_where(predicted, &press.image, |pixel| of_pixel[pixel] == zone)?;
             zones.extend(found.map(|(_, score)| (zone, score)));
         }
+        for place in DOT_PLACES.into_iter().filter(|_| press.hidden.is_some()) {
+            let inside = |pixel: usize| !place.in_contact || of_pixel[pixel] == Zone::Contact;
+            let there = |pixel: usize| inside(pixel) && press.hides(pixel) == place.in_dots;
+            dots.extend(score_where(predicted, &press.image, there)?.map(|(_, score)| (place, score)));
+        }
     }
-    Ok(PressScore { name: press.name.clone(), shape: press.shape().into(), scores, zones })
+    Ok(PressScore { name: press.name.clone(), shape: press.shape().into(), scores, zones, dots })
 }
 
 /// A square around `centre`, shifted inside the frame; a frame smaller than the square is taken whole.

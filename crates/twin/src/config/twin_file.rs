@@ -235,7 +235,7 @@ pub struct GelFile {
     pub kernels_px: Vec<u32>,
     /// The contact that blurs may not touch begins at this share of the press depth.
     pub restore_depth_fraction: f64,
-    /// Young's modulus; needed with `model = "elastic"`. Markers of the sensor move only where it is given.
+    /// Young's modulus; needed with `model = "elastic"`. Markers of the sensor move by it; without it they go with the surface of the gel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub young_modulus_mpa: Option<f64>,
     /// Poisson's ratio; 0.5, incompressible, where it is left out.

@@ -55,7 +55,7 @@ impl Candidate {
         let samples: Vec<Samples> = marked
             .iter()
             .enumerate()
-            .map(|(i, (_, contact))| Samples::draw(i, contact, ball_m, grid, &gel))
+            .map(|(i, marked)| Samples::draw(i, marked, ball_m, grid, &gel))
             .collect();
         let moments = samples.iter().map(Moments::of_inputs).collect();
         Self { gel, samples, moments }

@@ -72,7 +72,13 @@ impl Resized {
         let set = PressSet { ball_m: factor * self.set.ball_m, ..self.set.clone() };
         let marked = marked(&set)?;
         let candidate = Candidate::new(self.gel.clone(), &marked, set.ball_m, &self.grid);
-        let fit = Fit { set: &set, grid: self.grid, marked: &marked, press_gain_sd: self.press_gain_sd };
+        let fit = Fit {
+            set: &set,
+            grid: self.grid,
+            marked: &marked,
+            press_gain_sd: self.press_gain_sd,
+            dotted: false,
+        };
         let all: Vec<usize> = (0..marked.len()).collect();
         fit.fit_on(&candidate, self.smoothness, &all).ok()
     }

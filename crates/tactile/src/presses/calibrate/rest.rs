@@ -16,7 +16,7 @@ const RAW_REST_WEIGHT: f64 = 0.02;
 /// Mean over the presses of their image less its modelled change, far pixels first.
 ///
 /// Without a model (no `change`) the pixels close to a contact count next to nothing, so they only fill what no
-/// press leaves far; with one they count more.
+/// press leaves far; with one they count more. A pixel that a dot of the gel hides counts as without a model.
 pub(super) fn rest_frame(
     presses: &[(&Press, Contact)],
     change: impl Fn(usize) -> Option<[Plane; 3]>,
@@ -30,13 +30,14 @@ pub(super) fn rest_frame(
         let change = change(i);
         for (pixel, total) in weights.iter_mut().enumerate() {
             let t = (contact.beyond_rim_px(pixel, grid.width_px) / far_px).clamp(0.0, 1.0);
-            let weight = match &change {
+            let change = change.as_ref().filter(|_| !press.hides(pixel));
+            let weight = match change {
                 None => 1e-4 + t * t * t * t,
                 Some(_) => 1e-2 + t * t,
             };
             *total += weight;
             for (c, sum) in sums.iter_mut().enumerate() {
-                let modelled = change.as_ref().map_or(0.0, |planes| planes[c].values[pixel]);
+                let modelled = change.map_or(0.0, |planes| planes[c].values[pixel]);
                 sum[pixel] += weight * (f64::from(press.image.rgb[3 * pixel + c]) - f64::from(modelled));
             }
         }
@@ -65,16 +66,20 @@ pub(super) fn noise_rgb(presses: &[(&Press, Contact)], rest: &[Vec<f32>; 3], gri
                 if contact.beyond_rim_px(middle, grid.width_px) < far_px {
                     continue;
                 }
+                let rows = (top..top + side).map(|y| y * grid.width_px + left);
+                let square: Vec<usize> =
+                    rows.flat_map(|first| first..first + side).filter(|&pixel| !press.hides(pixel)).collect();
+                if 2 * square.len() < side * side {
+                    continue;
+                }
                 for (c, list) in variances.iter_mut().enumerate() {
                     let (mut sum, mut squares) = (0.0f64, 0.0f64);
-                    for y in top..top + side {
-                        for pixel in y * grid.width_px + left..y * grid.width_px + left + side {
-                            let d = f64::from(press.image.rgb[3 * pixel + c]) - f64::from(rest[c][pixel]);
-                            sum += d;
-                            squares += d * d;
-                        }
+                    for &pixel in &square {
+                        let d = f64::from(press.image.rgb[3 * pixel + c]) - f64::from(rest[c][pixel]);
+                        sum += d;
+                        squares += d * d;
                     }
-                    let n = (side * side) as f64;
+                    let n = square.len() as f64;
                     list.push((squares - sum * sum / n) / (n - 1.0));
                 }
             }

@@ -1,5 +1,6 @@
 //! Pixels of a press and what the regressor sees there.
 
+use super::super::contact::Marked;
 use super::super::{Contact, Press, drawn};
 use crate::colour::regressor::{
     AROUND_FITTED, NEAR, Place, between_cells, cell_px, fitted_surroundings, limited_normal, near_terms,
@@ -54,8 +55,14 @@ pub(super) struct Samples {
 
 impl Samples {
     /// Draws pixels of press number `index`; the same ones each time.
-    pub(super) fn draw(index: usize, contact: &Contact, ball_m: f64, grid: &Grid, gel: &GelModel) -> Self {
-        let (pixels, weights) = choose(index as u64, contact, grid);
+    pub(super) fn draw(
+        index: usize,
+        (press, contact): &Marked<'_>,
+        ball_m: f64,
+        grid: &Grid,
+        gel: &GelModel,
+    ) -> Self {
+        let (pixels, weights) = choose(index as u64, press, contact, grid);
         let surface = gel.surface(contact, ball_m, grid);
         let (along_x, along_y) = gradient(&surface);
         let mm_per_px = grid.metres_per_px * 1e3;
@@ -99,10 +106,11 @@ fn between(plane: &Plane, (x0, x1, wx): (usize, usize, f32), (y0, y1, wy): (usiz
     row(y0) + wy * (row(y1) - row(y0))
 }
 
-fn choose(index: u64, contact: &Contact, grid: &Grid) -> (Vec<usize>, Vec<f32>) {
+/// Pixels of each zone that no dot of the gel hides.
+fn choose(index: u64, press: &Press, contact: &Contact, grid: &Grid) -> (Vec<usize>, Vec<f32>) {
     let mm_per_px = grid.metres_per_px * 1e3;
     let mut zones = [const { Vec::new() }; ZONES_MM.len()];
-    for pixel in 0..grid.len() {
+    for pixel in (0..grid.len()).filter(|&pixel| !press.hides(pixel)) {
         let mm = contact.beyond_rim_px(pixel, grid.width_px) * mm_per_px;
         let zone = ZONES_MM.iter().position(|&(up_to, _, _)| mm < up_to).unwrap_or(ZONES_MM.len() - 1);
         zones[zone].push(pixel);

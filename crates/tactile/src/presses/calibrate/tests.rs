@@ -1,11 +1,14 @@
 use super::gel::FOLLOW;
 use super::*;
 use crate::convolve::Follow;
-use crate::presses::compare::predict_contact;
+use crate::markers::{marker_displacements_by_surface, print_markers};
+use crate::presses::compare::{gel_of, predict_contact};
 use crate::presses::{
     BallSizeBy, Contact, Indenter, IndenterPose, Press, check_ball_size, compare_presses, find_circle,
 };
+use crate::render::Renderer;
 use crate::sensor::Pyramid;
+use crate::simd::SimdLevel;
 use crate::testing::lights;
 use gripgen_twin::TriMesh;
 use nalgebra::Point3;
@@ -96,6 +99,46 @@ fn a_sensor_is_found_again_from_its_presses() {
     let read = Sensor::from_npz(&found.sensor.to_npz().unwrap().unwrap(), None, None).unwrap();
     assert_eq!(read, found.sensor);
     assert_eq!(compare_presses(&fresh, &read).unwrap().mean, scores);
+}
+
+/// Dots that each press drags along hide a tenth of the gel: the fit outside of them is as good as without any.
+#[test]
+fn a_sensor_is_found_through_dots() {
+    let plain = truth();
+    let grid = plain.grid;
+    let markers = Markers::regular(&grid, 8, 6, 15.0, 2.4, [0.6, 0.7, 0.7]);
+    let mut rest = plain.rest.clone();
+    print_markers(&mut rest, &grid, &markers);
+    let truth = Sensor { markers: Some(markers.clone()), rest, ..plain };
+    let mut set = presses(&truth, 16);
+    for (i, press) in set.presses.iter_mut().enumerate() {
+        let contact = Contact::of_circle(press.circle.unwrap());
+        let gel = gel_of(&truth);
+        let renderer = Renderer { sensor: &truth, gel: &gel, level: SimdLevel::best() };
+        let imprint = contact.imprint(set.ball_m, &grid, &GelShape::Flat, 0.0);
+        let shear = [0.8 * (i as f64).sin(), 0.8 * (i as f64).cos()];
+        let surface = renderer.surface(&imprint);
+        let moved = marker_displacements_by_surface(&surface, grid.metres_per_px, shear, &markers.rest_px);
+        let mut change = renderer.unmarked_change(&imprint);
+        renderer.draw_moved(&moved, &mut change);
+        press.image = crate::finish(&truth, Some(&change), Some(i as u64));
+    }
+    set.rest = Some(crate::finish(&truth, None, Some(99)));
+    let options = CalibrateOptions { folds: Some(3), gel_shape: Some(GelShape::Flat) };
+    let found = calibrate_presses(&set, &options).unwrap();
+    let floor = f64::from(NOISE * NOISE) + 2.0 / 12.0;
+    let [frame, _, contact, in_contact] = &found.held_out.by_dots[..] else { panic!("{:?}", found.held_out) };
+    println!(
+        "frame {:.2}, contact {:.2}, in dots {:.2}; floor {floor:.2}",
+        frame.2.mse, contact.2.mse, in_contact.2.mse
+    );
+    assert!(frame.2.mse < 1.5 * floor && contact.2.mse < 4.0 * floor, "{frame:?} {contact:?}");
+    assert!(in_contact.2.mse > contact.2.mse, "{in_contact:?}");
+    let dots = found.sensor.markers.unwrap();
+    assert_eq!(dots.rest_px.len(), 48);
+    assert!((dots.radius_px - 2.4).abs() < 0.3, "{}", dots.radius_px);
+    // A frame that is the same for a gel without dots.
+    assert!(found.sensor.noise_rgb.iter().all(|noise| (noise / NOISE - 1.0).abs() < 0.15));
 }
 
 /// Balls given too large or too small by a half draw a tip of known slopes in the wrong colours.
