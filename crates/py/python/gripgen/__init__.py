@@ -19,6 +19,7 @@ from ._core import ConfigError, DataError, GripgenError, __version__
 from .bags import BagSummary, read_bag
 from .dataset import Batch, Dataset, Sample, load
 from .films import Film
+from .forces import Force, ForceScale, force, force_scale
 from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, diagnose
 from .policies import Staircase
 from .rendering import Rendered, dots, render
@@ -34,9 +35,11 @@ __all__ = [
     "ConfigError",
     "DataError",
     "Dataset",
+    "Diagnosis",
     "Film",
     "FilmBatch",
-    "Diagnosis",
+    "Force",
+    "ForceScale",
     "GripgenError",
     "Pull",
     "Rendered",
@@ -51,6 +54,8 @@ __all__ = [
     "compare",
     "diagnose",
     "dots",
+    "force",
+    "force_scale",
     "load",
     "read_bag",
     "render",
