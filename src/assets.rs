@@ -26,6 +26,7 @@ static FILES: &[(&str, &[u8])] = embedded![
     "configs/twin.toml",
     "priors/friction.toml",
     "priors/gel.toml",
+    "priors/images.toml",
     "priors/pulls.toml",
     "priors/rig.toml",
     "robots/ur5e/ur5e.urdf",

@@ -101,6 +101,28 @@ def test_a_reference_takes_the_unit_of_the_volume_out_and_narrows_the_interval()
     assert late.n_per_mm3 == pytest.approx(0.1)
 
 
+def test_volumes_are_read_off_images() -> None:
+    sensor = "asset:sensors/gelsight_taxim/sensor.npz"
+    with np.load(ROOT / "assets" / sensor.removeprefix("asset:")) as file:
+        mm_per_px, rest = float(file["mm_per_px"]), np.rint(file["rest_rgb"]).astype(np.uint8)
+    y, x = (np.mgrid[:240, :320] - np.array([120.0, 160.0])[:, None, None]) * mm_per_px
+    caps = []
+    images = []
+    for depth_mm, radius_mm in ((0.4, 6.0), (0.8, 6.0), (0.6, 10.0)):
+        ball = np.sqrt(np.maximum(radius_mm**2 - x**2 - y**2, 0.0)) - radius_mm + depth_mm
+        heights = np.where(x**2 + y**2 < radius_mm**2, ball, -np.inf)
+        images.append(gg.render(heights, sensor=sensor).image)
+        caps.append(np.maximum(ball, 0.0).sum() * mm_per_px**2)
+    found = gg.imprint_volume_mm3(np.stack(images), sensor=sensor)
+    assert np.abs(found / caps - 1).max() < 0.25, (found, caps)
+    assert gg.imprint_volume_mm3(images[1], sensor=sensor, rest=rest) == pytest.approx(found[1], rel=0.05)
+    assert abs(gg.imprint_volume_mm3(rest, sensor=sensor)[0]) < 1.0, "nothing touches"
+    with pytest.raises(ValueError, match=r"\(240, 320\)"):
+        gg.imprint_volume_mm3(np.zeros((240, 320)), sensor=sensor)
+    with pytest.raises(gg.ConfigError, match="100x80"):
+        gg.imprint_volume_mm3(np.zeros((80, 100, 3)), sensor=sensor)
+
+
 def test_what_is_no_imprint_is_refused() -> None:
     with pytest.raises(ValueError, match="volume_mm3"):
         gg.force([1.0, np.nan])

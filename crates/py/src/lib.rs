@@ -6,10 +6,10 @@
 #![expect(clippy::needless_pass_by_value, reason = "arguments of functions for Python are owned")]
 
 mod dataset;
-mod dots;
 mod error;
 mod film;
 mod hints;
+mod images;
 mod pulls;
 mod render;
 mod rig;
@@ -72,7 +72,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(run_cli, module)?)?;
     module.add_function(wrap_pyfunction!(run_verb, module)?)?;
     module.add_function(wrap_pyfunction!(ur5e_tool_m, module)?)?;
-    module.add_function(wrap_pyfunction!(dots::dots, module)?)?;
+    module.add_function(wrap_pyfunction!(images::dots, module)?)?;
+    module.add_function(wrap_pyfunction!(images::imprint_volumes_mm3, module)?)?;
     module.add_function(wrap_pyfunction!(render::render, module)?)?;
     module.add_function(wrap_pyfunction!(rig::rig_check, module)?)?;
     module.add_function(wrap_pyfunction!(rig::rig_rehearse, module)?)?;

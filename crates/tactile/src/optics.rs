@@ -1,7 +1,7 @@
 //! The image as the optics effects of a twin change it.
 //!
 //! An [`OpticsState`] acts in this order, whatever the order of the effects: the edges of the part (`rounding`), the depth of
-//! the press and the shape of the gel at rest (here), the
+//! the press and the shape of the gel at rest (here), the relief of the part (`relief`), the
 //! kernels of the gel (`kernels`), the shape of the part (`shape`), where the contact is seen (`warp`), shadow,
 //! focus and offset of what the contact changes (`shadow`, here), light and camera on the whole frame (`camera`). A
 //! stage in which nothing is changed is the plain one, bit for bit. Noise comes after all of it: it is the camera's.
@@ -11,6 +11,7 @@ mod camera;
 mod fit_tests;
 mod kernels;
 mod pattern;
+pub(crate) mod relief;
 mod rounding;
 mod shadow;
 mod shape;

@@ -30,6 +30,7 @@ use gripgen_twin::TactileImage;
 use gripgen_twin::random::splitmix64;
 use std::sync::Arc;
 
+pub(crate) use compare::gel_of;
 pub(crate) use contact::Contact;
 pub use contact::{MarkError, ZONES, Zone};
 pub use indenter::{

@@ -7,6 +7,7 @@
 
 use crate::gradient::gradient;
 use crate::grid::{Plane, added};
+use crate::presses::gel_of;
 use crate::render::Renderer;
 use crate::sensor::Sensor;
 use crate::simd::SimdLevel;
@@ -97,6 +98,15 @@ impl VolumeReader {
         let off = |(truth, read): &(f64, f64)| (reader.factor * read / truth - 1.0).powi(2);
         reader.scatter = (both.iter().map(off).sum::<f64>() / both.len() as f64).sqrt();
         Ok(reader)
+    }
+
+    /// The inverse of a sensor whose file says how its gel deforms; of another one the deformation of Wucherer et al. 2023.
+    ///
+    /// # Errors
+    ///
+    /// [`VolumeError::Colours`].
+    pub fn of_sensor(sensor: &Sensor, level: SimdLevel) -> Result<Self, VolumeError> {
+        Self::new(sensor, &gel_of(sensor), level)
     }
 
     /// Standard deviation of the relative error on the balls that it was fitted to: of sizes and places that differ.

@@ -62,6 +62,10 @@ pub struct OpticsState {
     pub press_offset_m: f64,
     /// Radius of the part's convex edges.
     pub edge_rounding_m: f64,
+    /// Root of the mean square of the relief of the part's surface.
+    pub relief_m: f64,
+    /// Tells the reliefs of parts apart; 0 without one.
+    pub relief_key: u64,
 }
 
 impl Default for OpticsState {
@@ -88,6 +92,8 @@ impl Default for OpticsState {
             press_factor: 1.0,
             press_offset_m: 0.0,
             edge_rounding_m: 0.0,
+            relief_m: 0.0,
+            relief_key: 0,
         }
     }
 }

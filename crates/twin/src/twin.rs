@@ -204,6 +204,10 @@ pub struct Part {
     pub scatter: f64,
     /// Imprint constant c of V = c F.
     pub imprint_m3_per_n: f64,
+    /// Radius of its convex edges, in images.
+    pub edge_radius_m: f64,
+    /// Root of the mean square of the relief of its surface, in images.
+    pub relief_m: f64,
 }
 
 /// What stands in place of the path of a mesh for a part of which only labels are known.

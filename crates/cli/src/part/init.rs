@@ -316,6 +316,8 @@ pub(crate) fn search(path: &Path, options: PartOptions, twin: Twin) -> Result<Se
         kinetic_fall_s: 0.0,
         scatter: 0.0,
         imprint_m3_per_n: IMPRINT_MM3_PER_N * 1e-9,
+        edge_radius_m: 0.0,
+        relief_m: 0.0,
     };
     let mut twin = Twin { parts: BTreeMap::from([(PART.to_string(), part.clone())]), ..twin };
     // Paths are relative to where the program was started.

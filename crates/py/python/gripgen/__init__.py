@@ -22,7 +22,7 @@ from .films import Film
 from .forces import Force, ForceScale, force, force_scale
 from .identify import Calibration, Comparison, Diagnosis, calibrate, compare, diagnose
 from .policies import Staircase
-from .rendering import Rendered, dots, render
+from .rendering import Rendered, dots, imprint_volume_mm3, render
 from .simulation import Pull, Sim
 from .streams import FilmBatch, Stream, StreamBatch, stream
 from .sweeps import SweepSummary, sweep
@@ -56,6 +56,7 @@ __all__ = [
     "dots",
     "force",
     "force_scale",
+    "imprint_volume_mm3",
     "load",
     "read_bag",
     "render",

@@ -32,6 +32,11 @@ struct EdgePixel {
 }
 
 impl Edges {
+    /// None yet, with memory for this many pixels.
+    pub(crate) fn with_room_for(pixels: usize) -> Self {
+        Self { pixels: Vec::with_capacity(pixels) }
+    }
+
     /// Adds a pixel: its place in the image, how much its points count, and the depth at each.
     pub(crate) fn push(&mut self, pixel: u32, weight: f32, depths_px: [f32; POINTS]) {
         self.pixels.push(EdgePixel { pixel, weight, depths_px });

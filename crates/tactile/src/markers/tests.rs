@@ -251,8 +251,8 @@ fn the_dots_of_a_frame_are_measured() {
     for (found, drawn) in found.darkness_rgb.iter().zip(drawn.darkness_rgb) {
         assert!((found - drawn).abs() < 0.05, "{found} {drawn}");
     }
-    // Each moved by up to 9 px, one gone: nobody takes its neighbour's place.
-    let by = |i: usize| [(i as f64 * 2.4).sin() * 9.0, (i as f64 * 1.7).cos() * 9.0];
+    // Each moved by up to 10 px, less than half the pitch, one gone: nobody takes its neighbour's place.
+    let by = |i: usize| [(i as f64 * 2.4).sin() * 7.0, (i as f64 * 1.7).cos() * 7.0];
     let dot = |i: usize| Dot {
         centre_px: [drawn.rest_px[i][0] + by(i)[0], drawn.rest_px[i][1] + by(i)[1]],
         pixels: vec![],

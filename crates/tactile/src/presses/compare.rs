@@ -220,7 +220,7 @@ pub(super) fn sink_in_fraction(sensor: &Sensor) -> f64 {
 }
 
 /// What the renderer needs of a gel: the deformation of the calibration, or that of Wucherer et al. 2023.
-pub(super) fn gel_of(sensor: &Sensor) -> Gel {
+pub(crate) fn gel_of(sensor: &Sensor) -> Gel {
     let usual = || Pyramid {
         kernels_px: vec![71, 51, 21, 11, 5],
         restore_depth_fraction: 0.4,

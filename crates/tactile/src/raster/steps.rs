@@ -7,6 +7,7 @@ use crate::convolve::Area;
 use crate::deform::Edges;
 use crate::grid::Plane;
 use crate::simd::{Kernel, Lanes, SimdLevel};
+use std::array::from_fn;
 
 /// Pixels that are summed side by side, and the sums of which all are made: the pixels of a block go to them in turn. A block is so long that the
 /// compiler takes it for a loop; it writes out shorter ones and leaves them to single numbers.
@@ -89,10 +90,10 @@ impl Steps {
 
     /// The depths at the points of each.
     pub(super) fn edges(&self, lift: f64) -> Edges {
-        let mut edges = Edges::default();
+        let mut edges = Edges::with_room_for(self.beside.pixels.len());
         for (block, pixels) in self.blocks.iter().zip(self.beside.pixels.chunks(SIDE)) {
             for (i, &pixel) in pixels.iter().enumerate() {
-                let depths_px = block.points.map(|heights| (f64::from(heights[i]) + lift) as f32);
+                let depths_px = from_fn(|point| (f64::from(block.points[point][i]) + lift) as f32);
                 edges.push(pixel, block.weights[i], depths_px);
             }
         }

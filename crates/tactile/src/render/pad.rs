@@ -10,7 +10,7 @@ use crate::deform::Edges;
 use crate::grid::{Grid, Plane, added};
 use crate::indent::press::{Press, reach_px};
 use crate::indent::{ElasticField, Imprint, IndentError, Indentation, PressedGel};
-use crate::optics::{at_depth, dome, rounded_as_seen};
+use crate::optics::{at_depth, dome, relief, rounded_as_seen};
 use crate::raster::ClusteredMesh;
 use crate::simd::SimdLevel;
 use gripgen_twin::frames::Pose;
@@ -96,6 +96,22 @@ impl Renderer<'_> {
     /// What the camera sees of the imprint `contact` that [`Pad::press`] or [`Pad::press_seen`] made of a part in this pose: the part
     /// in the same place, on the sensor's pixels and on the gel's shape in the sensor file.
     pub fn seen<'a>(
+        &self,
+        mesh: &ClusteredMesh,
+        gel_from_mesh: &Pose,
+        contact: &'a Imprint,
+        optics: &OpticsState,
+    ) -> Cow<'a, Imprint> {
+        let mut seen = self.seen_smooth(mesh, gel_from_mesh, contact, optics);
+        // An elastic gel was solved for a smooth part, and its surface is known.
+        if optics.relief_m > 0.0 && seen.elastic.is_none() {
+            relief::add(seen.to_mut(), gel_from_mesh, &self.sensor.grid, optics);
+        }
+        seen
+    }
+
+    /// The same of a part without relief.
+    fn seen_smooth<'a>(
         &self,
         mesh: &ClusteredMesh,
         gel_from_mesh: &Pose,

@@ -44,7 +44,7 @@ pub struct SweepFile {
     #[serde(default = "shard_samples")]
     pub shard_samples: u64,
     /// Files of priors: what they draw is added to `[vary]`, and their effects to the twin, where these lack them. Shipped:
-    /// `asset:priors/friction.toml`, `asset:priors/gel.toml`, `asset:priors/rig.toml`.
+    /// `asset:priors/friction.toml`, `asset:priors/gel.toml`, `asset:priors/rig.toml`, `asset:priors/images.toml`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub priors: Vec<String>,
     /// Values that vary: any key of the scenario, of `[pull]` (`pull.increment_n`) or of the twin

@@ -321,6 +321,12 @@ pub struct PartFile {
     pub scatter: f64,
     /// Imprint constant c of `V = c F`: imprint volume per normal force of a jaw.
     pub imprint_mm3_per_n: f64,
+    /// Radius of its convex edges where the mesh has sharp ones, in images; forces stay those of the mesh. Printed edges have 0.2.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub edge_radius_mm: f64,
+    /// Relief of its surface in images, root of the mean square: height that is fixed to the part, above 0.5 mm long. Printed faces have about 5.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub relief_um: f64,
     /// Where the numbers come from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,

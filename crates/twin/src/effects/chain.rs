@@ -1,6 +1,7 @@
 //! The effects of a twin on one part, hook by hook, in the order of the twin.
 
 use super::{CommandHook, Creep, Effect, EffectSpec, GripPoint, SensorHook, SensorMemory, SensorPoint};
+use crate::random::splitmix64;
 use crate::{Jaw, OpticsState, Part, Twin};
 use std::sync::Arc;
 
@@ -38,9 +39,18 @@ pub fn jaw_tilt_rad(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> f64 {
     })
 }
 
-/// The optics of a jaw, neutral without effects.
+/// The optics of a jaw: what the part's edges and surface are, then the effects.
 pub fn optics_state(twin: &Twin, part_name: &str, at: &GripPoint<'_>) -> OpticsState {
     let mut state = OpticsState::default();
+    if let Some(part) = twin.parts.get(part_name) {
+        (state.edge_rounding_m, state.relief_m) = (part.edge_radius_m, part.relief_m);
+        if part.relief_m > 0.0 {
+            state.relief_key = part_name.bytes().fold(0, |mut key, byte| {
+                key ^= u64::from(byte);
+                splitmix64(&mut key)
+            });
+        }
+    }
     for effect in acting(twin, part_name) {
         if let Some(hook) = effect.spec.optics {
             hook(&effect.values, &mut state, at);

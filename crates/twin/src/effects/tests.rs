@@ -133,10 +133,12 @@ fn numbers(state: &OpticsState) -> Vec<f64> {
         press_factor,
         press_offset_m,
         edge_rounding_m,
+        relief_m,
+        relief_key: _,
     } = *state;
     let mut all = vec![exposure_gain, gamma, rotation_rad, scale, distortion_k1, defocus_m, kernel_scale];
     all.extend([part_offset_m, edge_blunting_m, shadow_strength, light_elevation_rad, dome_sag_m]);
-    all.extend([press_factor, press_offset_m, edge_rounding_m, frame_moves]);
+    all.extend([press_factor, press_offset_m, edge_rounding_m, relief_m, frame_moves]);
     all.extend(finer_background.into_iter().flatten());
     all.extend(
         light_gain.into_iter().chain(shift_m).chain(rest_offset).chain(background.into_iter().flatten()),

@@ -140,6 +140,8 @@ pub(super) fn check_part(part: &PartFile, key: &str) -> Result<Part, ConfigError
         scatter: in_range(&at("scatter"), part.scatter, 0.0..=0.5, "1")?,
         imprint_m3_per_n: in_range(&at("imprint_mm3_per_n"), part.imprint_mm3_per_n, 1e-3..=1e3, "mm3/N")?
             * 1e-9,
+        edge_radius_m: in_range(&at("edge_radius_mm"), part.edge_radius_mm, 0.0..=1.0, "mm")? * 1e-3,
+        relief_m: in_range(&at("relief_um"), part.relief_um, 0.0..=50.0, "um")? * 1e-6,
     })
 }
 

@@ -105,6 +105,8 @@ fn part_of(part: &BenchmarkPart) -> Part {
         kinetic_fall_s: 0.0,
         scatter: 0.0,
         imprint_m3_per_n: IMPRINT_MM3_PER_N * 1e-9,
+        edge_radius_m: 0.0,
+        relief_m: 0.0,
     }
 }
 
