@@ -3,6 +3,7 @@
 mod identify;
 mod part;
 mod rig;
+mod sensor;
 mod values;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -12,6 +13,7 @@ pub use identify::{
 };
 pub use part::{InitArgs, RenderArgs, TryArgs};
 pub use rig::{RigCheckArgs, RigCommand, RigPullArgs, RigRehearseArgs, RigServeArgs, RigTeachArgs};
+pub use sensor::{SensorCheckArgs, SensorCommand};
 use std::path::PathBuf;
 use values::{key_value, seconds, slice};
 
@@ -52,6 +54,9 @@ pub enum Command {
     Calibrate(CalibrateCommand),
     /// Say how far a twin or a sensor file is from measurements.
     Compare(CompareArgs),
+    /// Check a sensor file on another day.
+    #[command(subcommand)]
+    Sensor(SensorCommand),
     /// Find out where a twin is wrong, and why: pulls, force-sensor tables, presses.
     Diagnose(DiagnoseArgs),
     /// Draw what a sensor sees of a mesh that is pressed in.

@@ -17,6 +17,7 @@ pub mod init;
 pub mod render;
 pub mod rig;
 pub mod schema;
+pub mod sensor_check;
 pub mod show;
 pub mod sweep;
 pub mod try_part;

@@ -47,6 +47,9 @@ pub const CALIBRATE_IMPRINTS: &str = "Examples:
 pub const COMPARE: &str = "Examples:
   gripgen compare measured --twin diagnosed.toml
   gripgen compare presses --sensor sensor.npz --report presses.html";
+pub const SENSOR_CHECK: &str = "Examples:
+  gripgen sensor check sensor.npz five-presses
+  gripgen sensor check sensor.npz five-presses -o today.npz --report today.html";
 pub const DIAGNOSE: &str = "Examples:
   gripgen diagnose measured
   gripgen diagnose measured -o diagnosed.toml --report report.html

@@ -29,7 +29,7 @@ pub mod rig;
 mod schema;
 mod shell;
 
-use args::{CalibrateCommand, Cli, Command, RigCommand};
+use args::{CalibrateCommand, Cli, Command, RigCommand, SensorCommand};
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches};
 use std::ffi::OsString;
@@ -158,6 +158,7 @@ fn execute(cli: &Cli) -> Result<u8, Failure> {
         Command::Rig(RigCommand::Serve(args)) => commands::rig::serve::run(args),
         Command::Compare(args) => commands::compare::run(args),
         Command::Diagnose(args) => commands::diagnose::run(args),
+        Command::Sensor(SensorCommand::Check(args)) => commands::sensor_check::run(args),
         Command::Render(args) => commands::render::run(args),
         Command::Effects(args) => commands::effects::run(args),
         Command::Campaign(args) => commands::campaign::run(args),

@@ -46,13 +46,17 @@ pub struct PressShown<'a> {
     pub scores: PressScores,
 }
 
-/// A picture of the frame that shows where something was pressed.
+/// A picture of the frame: where something was pressed, or what is left.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PressMap {
     /// The picture.
     pub image: TactileImage,
+    /// Heading of its section.
+    pub title: String,
     /// What it shows, in words.
     pub text: String,
+    /// What stands under it.
+    pub caption: String,
 }
 
 /// What a report of presses shows.
@@ -66,7 +70,7 @@ pub struct PressPage<'a> {
     pub meaning: String,
     /// Names and values of what was found.
     pub facts: Vec<(String, String)>,
-    /// Where in the frame something was pressed.
+    /// A map of the frame.
     pub map: Option<PressMap>,
     /// Means over all presses.
     pub mean: PressScores,
@@ -94,9 +98,8 @@ pub fn press_page(shown: &PressPage<'_>, predict: impl Fn(usize) -> Option<Tacti
     );
     page.table(&means(shown));
     if let Some(map) = &shown.map {
-        let about = format!("{}. Colours elsewhere are continued from there.", map.text);
-        page.section("Where something was pressed", &about);
-        page.figures(&[picture("frame at rest, dark where nothing was pressed", &map.image)], &[], 0);
+        page.section(&map.title, &map.text);
+        page.figures(&[picture(&map.caption, &map.image)], &[], 0);
     }
     page.section("The worst, the middle and the best press", "");
     for (rank, i) in ranks(&order) {
@@ -209,7 +212,12 @@ mod tests {
         assert!(page.contains("two &lt;b&gt;: MSE 9.0 in the 400 px crop (the worst)"), "names are escaped");
         assert_eq!(page.matches("<img ").count(), 12, "worst three and best; the median is among them");
         assert!(page.contains("whole frame</td><td class=\"\">4.00</td>"));
-        shown.map = Some(PressMap { image: image.clone(), text: "60 % of the frame".into() });
+        shown.map = Some(PressMap {
+            image: image.clone(),
+            title: "Where something was pressed".into(),
+            text: "60 % of the frame".into(),
+            caption: "at rest".into(),
+        });
         let page = press_page(&shown, |_| None);
         assert!(page.contains("60 % of the frame") && page.matches("<img ").count() == 1, "the map");
     }

@@ -7,6 +7,7 @@ mod compare;
 mod contact;
 mod coverage;
 mod data_pack;
+mod day;
 mod dots;
 mod gain;
 mod indenter;
@@ -25,6 +26,10 @@ pub use compare::{
 };
 pub use coverage::{PARTS, PressCoverage, RIM_M, SEEN_SHARE, press_coverage};
 pub use data_pack::{DATA_PACK_BALL_M, DATA_PACK_METRES_PER_PX, DataPackError};
+pub use day::{
+    BeyondBall, Cause, Change, DayCheck, DayError, DayNumber, Explanation, GreyCost, GreyRms, Light, Spot,
+    beyond_ball, check_day,
+};
 
 use gripgen_twin::TactileImage;
 use gripgen_twin::random::splitmix64;

@@ -215,7 +215,12 @@ fn map(coverage: &PressCoverage, sensor: &Sensor) -> PressMap {
     };
     let rgb = (0..sensor.grid.len()).flat_map(|pixel| [0, 1, 2].map(|c| level(pixel, c))).collect();
     let (width_px, height_px) = (sensor.grid.width_px as u32, sensor.grid.height_px as u32);
-    PressMap { image: TactileImage { width_px, height_px, rgb }, text: coverage_in_words(coverage) }
+    PressMap {
+        image: TactileImage { width_px, height_px, rgb },
+        title: "Where something was pressed".into(),
+        text: format!("{}. Colours elsewhere are continued from there.", coverage_in_words(coverage)),
+        caption: "frame at rest, dark where nothing was pressed".into(),
+    }
 }
 
 fn in_words(size: &BallSize) -> String {

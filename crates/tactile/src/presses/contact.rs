@@ -88,6 +88,12 @@ impl Contact {
         }
     }
 
+    /// The same with a circle no wider than a ball.
+    pub(super) fn within(&self, ball_m: f64, grid: &Grid) -> Self {
+        let most = 0.999 * ball_m / 2.0 / grid.metres_per_px;
+        Self { circle: Circle { radius_px: self.circle.radius_px.min(most), ..self.circle }, ..self.clone() }
+    }
+
     /// The contact in an image whose pixels are `factor` times as wide.
     pub(crate) fn in_wider_pixels(&self, factor: usize) -> Self {
         let f = factor as f64;
@@ -110,7 +116,7 @@ pub(super) fn imprint(depth_px: Plane, press_depth_m: f64) -> Imprint {
 }
 
 /// Hand-drawn circles are unsure by a few per cent: one up to so much wider than the ball is taken for its equator.
-const WIDEST: f64 = 1.05;
+pub(super) const WIDEST: f64 = 1.05;
 
 /// Why a mark cannot be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -13,6 +13,7 @@ use crate::render::Renderer;
 use crate::sensor::{GelShape, Sensor};
 use crate::simd::SimdLevel;
 use gripgen_twin::{Gel, OpticsState};
+pub(super) use reduce::means;
 use reduce::reduced_sensor;
 
 /// Widest image that is looked at pixel by pixel: larger ones are averaged over squares of pixels for fits.

@@ -46,7 +46,7 @@ fn reduced_kernel(size_px: u32, factor: usize) -> u32 {
 }
 
 /// Means over squares of `factor` x `factor` pixels.
-pub(super) fn means(plane: &[f32], width: usize, height: usize, factor: usize) -> Vec<f32> {
+pub(in crate::presses) fn means(plane: &[f32], width: usize, height: usize, factor: usize) -> Vec<f32> {
     let (w, h) = (width / factor, height / factor);
     let share = 1.0 / (factor * factor) as f32;
     let mut out = vec![0.0; w * h];
