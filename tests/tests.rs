@@ -74,6 +74,8 @@ mod posterior;
 mod press_diagnosis;
 // Presses of a ball into a real sensor.
 mod presses;
+// A sensor file on another day.
+mod sensor_check;
 // Labels against closed forms, through the whole pipeline.
 mod pull;
 // What a twin simulates is what it predicts.

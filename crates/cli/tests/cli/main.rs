@@ -31,6 +31,8 @@ mod rig_notes;
 mod rig_run;
 mod rig_served;
 mod rig_verbs;
+// A sensor file on another day.
+mod sensor_check;
 // Parts at a glance.
 mod try_part;
 

@@ -27,11 +27,14 @@ use crate::sensor::Sensor;
 use gripgen_twin::TactileImage;
 use outcome::{Outcome, Settled, outcome};
 use taken::{Allowed, Taken};
-use tried::{Day, SINK_IN_STEP};
+use tried::{Day, SINK_IN_STEP, draw};
 use verdict::{decide, mean_and_se};
 
 /// Zones around a contact.
 const ZONE_COUNT: usize = 4;
+
+/// Narrowest image that is fitted to.
+const FIT_WIDTH_PX: usize = 120;
 
 /// An even shift of a colour that a session may have, grey levels: twice the 1.3 that real ones have.
 const LEVEL: f64 = 2.6;
@@ -192,6 +195,17 @@ pub struct GreyCost {
     pub after: GreyRms,
 }
 
+impl GreyCost {
+    /// Whether the file for the day is closer where a cause acts: over the frame, or in contacts.
+    fn is_lower(&self, cause: Cause) -> bool {
+        match cause {
+            Cause::Nothing => true,
+            Cause::Light | Cause::Scale => self.after.frame < self.before.frame,
+            Cause::Gel | Cause::Ball | Cause::Force => self.after.contact < self.before.contact,
+        }
+    }
+}
+
 /// A number of a change with its 90 % interval, by leaving out one press at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DayNumber {
@@ -272,7 +286,7 @@ pub fn check_day(set: &PressSet, sensor: &Sensor) -> Result<DayCheck, DayError> 
     tried.extend([day.scale(), day.ball(), day.force()]);
     let depths = balls.iter().all(|press| press.travel_m.is_some());
     let sink_in = sensor.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.sink_in_fraction);
-    let seen: Vec<f64> = day.same.iter().map(|left| left.ln_radius).collect();
+    let seen = &day.ln_radii;
     // What a depth says of a radius, where there is one.
     let stated = |(i, press): (usize, &&Press)| {
         let by_depth = press.travel_m.map(|travel_m| {
@@ -282,16 +296,27 @@ pub fn check_day(set: &PressSet, sensor: &Sensor) -> Result<DayCheck, DayError> 
         seen[i] + by_depth.filter(|px| *px > 0.0).map_or(0.0, |px| libm::log(marked / px))
     };
     let ln_radii: Vec<f64> = balls.iter().enumerate().map(stated).collect();
-    let (best, explanations) = decide(tried, &ln_radii, depths);
+    let (best, mut explanations) = decide(tried, &ln_radii, depths);
     let best = best.map(|best| match best.change {
-        Change::Force { .. } => of_radii(&seen),
+        Change::Force { .. } => of_radii(seen),
         _ => best,
     });
     let gains = best.as_ref().map(|best| best.gains.len());
     debug_assert!(gains.is_none_or(|n| n == balls.len()));
-    let settled = Settled::new(&day, best);
-    let Outcome { cost, drawn, map, spots, explained } =
-        outcome(&settled, &balls, &contacts, set.ball_m, sensor, LEVEL);
+    let judge = |best: Option<Tried>| {
+        let settled = Settled::new(&day, best);
+        let outcome = outcome(&settled, &balls, &contacts, set.ball_m, sensor, LEVEL);
+        (settled, outcome)
+    };
+    let (mut settled, mut found) = judge(best);
+    if !found.cost.is_lower(settled.change.cause()) {
+        // A change that makes the images of presses worse that it was not fitted to is none.
+        (settled, found) = judge(None);
+        for e in &mut explanations {
+            (e.weight, e.ties) = (if e.cause == Cause::Nothing { 1.0 } else { 0.0 }, false);
+        }
+    }
+    let Outcome { cost, drawn, map, spots, explained } = found;
     let cause = explained.then(|| settled.change.cause());
     Ok(DayCheck {
         cause,
@@ -426,7 +451,7 @@ fn contacts(balls: &[&Press], ball_m: f64, sensor: &Sensor) -> Result<Vec<Contac
 
 /// The presses at the resolution of a fit.
 fn day(balls: &[&Press], contacts: &[Contact], ball_m: f64, sensor: &Sensor) -> Day {
-    let scene = PressScene::for_fits(sensor, ball_m);
+    let scene = PressScene::at_least(FIT_WIDTH_PX, sensor, ball_m);
     let factor = scene.factor();
     let reduced = scene.sensor().clone();
     let (gains, shared) = session_gains(balls, contacts, sensor);
@@ -436,8 +461,19 @@ fn day(balls: &[&Press], contacts: &[Contact], ball_m: f64, sensor: &Sensor) -> 
             Some(_) => with_gain(&press.image, gain.map(|g| 1.0 / g)),
             None => press.image.clone(),
         };
-        let measured = levels_of(&image).map(|plane| means(&plane, sensor.grid.width_px, factor));
-        let contact = contact.in_wider_pixels(factor);
+        let full_width = sensor.grid.width_px;
+        let mut measured = levels_of(&image).map(|plane| means(&plane, full_width, factor));
+        let here = contact.in_wider_pixels(factor);
+        if factor > 1 {
+            // What the full resolution draws beyond the fit's is no change of the day.
+            let (fine, coarse) = (draw(sensor, contact, ball_m), draw(&reduced, &here, ball_m));
+            for c in 0..3 {
+                let fine = means(&fine[c].values, full_width, factor);
+                let beyond = fine.iter().zip(&coarse[c].values).map(|(fine, coarse)| fine - coarse);
+                measured[c].iter_mut().zip(beyond).for_each(|(level, beyond)| *level -= beyond);
+            }
+        }
+        let contact = here;
         let zone = |p: usize| Zone::at(contact.beyond_rim_px(p, width) / contact.circle.radius_px.max(1.0));
         let zones = (0..reduced.grid.len()).map(zone).collect();
         Taken { width, measured, zones, contact }

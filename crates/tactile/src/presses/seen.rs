@@ -72,8 +72,13 @@ impl PressScene {
     /// At a resolution that suffices for fits: squares of 2 x 2 pixels or more of a large image are one. Sensors with
     /// markers keep theirs.
     pub fn for_fits(sensor: &Sensor, ball_m: f64) -> Self {
+        Self::at_least(FIT_WIDTH_PX, sensor, ball_m)
+    }
+
+    /// The same with images at least so wide.
+    pub(super) fn at_least(width_px: usize, sensor: &Sensor, ball_m: f64) -> Self {
         let (w, h) = (sensor.grid.width_px, sensor.grid.height_px);
-        let fits = |f: &usize| w.is_multiple_of(*f) && h.is_multiple_of(*f) && w / f >= FIT_WIDTH_PX;
+        let fits = |f: &usize| w.is_multiple_of(*f) && h.is_multiple_of(*f) && w / f >= width_px;
         let factor = (1..=8).filter(fits).max().unwrap_or(1);
         match reduced_sensor(sensor, factor) {
             Some(sensor) => Self { gel: gel_of(&sensor), sensor, ball_m, factor },

@@ -1,6 +1,6 @@
 //! What a change costs in grey levels, what it leaves, and where on the gel.
 
-use super::changed::changed;
+use super::changed::{changed, seen_before};
 use super::spots::{Residuals, spots};
 use super::tried::Day;
 use super::{Change, GreyCost, GreyRms, Spot, Tried};
@@ -113,21 +113,26 @@ pub(super) fn outcome(
         residuals.push(Residuals::of(&press.image, &new, zones));
         drawn.push(new);
     }
-    let (shared, own) = far_field(&residuals, grid.len());
+    // What a camera that looks further sees beyond the old frame is not known.
+    let known = match &settled.change {
+        Change::Scale { zoom, shift } => seen_before(&grid, *zoom, *shift),
+        _ => vec![true; grid.len()],
+    };
+    let (shared, own) = far_field(&residuals, &known);
     let frame_explained = shared < FRAME_TIMES * own || shared < level * level;
     Outcome {
         cost: GreyCost { before: before.rms(), after: after.rms() },
         drawn,
         map: super::spots::map(&residuals, grid.width_px),
-        spots: spots(&residuals, grid.width_px),
+        spots: spots(&residuals, &known, grid.width_px),
         explained: left < UNEXPLAINED * shown && frame_explained,
     }
 }
 
 /// Mean square of what is left far from contacts, and of what the presses differ by among themselves there.
-fn far_field(residuals: &[Residuals], pixels: usize) -> (f64, f64) {
+fn far_field(residuals: &[Residuals], known: &[bool]) -> (f64, f64) {
     let (mut all, mut own, mut count) = (0.0, 0.0, 0usize);
-    for p in 0..pixels {
+    for p in (0..known.len()).filter(|&p| known[p]) {
         let far: Vec<[f32; 3]> =
             residuals.iter().filter(|r| r.zones[p] == Zone::Far).map(|r| r.grey[p]).collect();
         if far.len() < 2 {

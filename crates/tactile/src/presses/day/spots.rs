@@ -83,14 +83,15 @@ fn boxes(plane: &[f32], width: usize, half: usize) -> Vec<f32> {
 }
 
 /// Places that stand out, the same way, in two presses or more outside of the rims of their contacts: the largest first.
-pub(super) fn spots(residuals: &[Residuals], width: usize) -> Vec<Spot> {
+pub(super) fn spots(residuals: &[Residuals], known: &[bool], width: usize) -> Vec<Spot> {
     let each: Vec<Vec<i8>> = residuals.iter().map(|r| r.standing_out(width)).collect();
     let pixels = residuals.first().map_or(0, |r| r.grey.len());
     let count = |p: usize, sign: i8| {
         let seen = each.iter().zip(residuals).filter(|(out, r)| out[p] == sign && r.zones[p] != Zone::Rim);
         seen.count()
     };
-    let mut left: Vec<bool> = (0..pixels).map(|p| count(p, 1) >= 2 || count(p, -1) >= 2).collect();
+    let mut left: Vec<bool> =
+        (0..pixels).map(|p| known[p] && (count(p, 1) >= 2 || count(p, -1) >= 2)).collect();
     let mut found = Vec::new();
     for start in 0..pixels {
         if !left[start] {
@@ -164,16 +165,16 @@ mod tests {
     #[test]
     fn a_scratch_is_what_stands_out_in_several_presses() {
         let seen = [press(true, 1), press(true, 2), press(false, 3)];
-        let found = spots(&seen, W);
+        let found = spots(&seen, &[true; W * 40], W);
         assert_eq!(found.len(), 1, "{found:?}");
         let spot = &found[0];
         assert!((spot.x_px - 24.5).abs() < 1.0 && (spot.y_px - 13.0).abs() < 1.0, "{spot:?}");
         assert!(spot.presses == 2 && (20..60).contains(&spot.pixels) && spot.grey < -10.0, "{spot:?}");
         // What one press alone shows is no scratch.
-        assert_eq!(spots(&[press(true, 1), press(false, 2), press(false, 3)], W), vec![]);
+        assert_eq!(spots(&[press(true, 1), press(false, 2), press(false, 3)], &[true; W * 40], W), vec![]);
         // The rim of a contact is drawn wrong more than anything else.
         let rim = |seed| Residuals { zones: vec![Zone::Rim; W * 40], ..press(true, seed) };
-        assert_eq!(spots(&[rim(1), rim(2)], W), vec![]);
+        assert_eq!(spots(&[rim(1), rim(2)], &[true; W * 40], W), vec![]);
         let map = map(&seen, W);
         assert!(map.rgb[3 * (13 * W + 25)] < 10 && map.rgb[3 * (30 * W + 5)].abs_diff(128) < 12);
     }

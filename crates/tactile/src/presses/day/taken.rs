@@ -63,6 +63,7 @@ impl Taken {
         wider: &[Plane; 3],
         within: Option<&[bool]>,
         allowed: &Allowed,
+        ln_radius: Option<f64>,
     ) -> Left {
         let inside = |p: usize| within.is_none_or(|within| within[p]);
         let mut residual = [0, 1, 2].map(|c| {
@@ -75,7 +76,7 @@ impl Taken {
         for (plane, level) in residual.iter_mut().zip(level) {
             plane.iter_mut().for_each(|r| *r -= level as f32);
         }
-        let ln_radius = self.straighten(&mut residual, change, wider, &inside, allowed);
+        let ln_radius = self.straighten(&mut residual, change, wider, &inside, allowed, ln_radius);
         let (mut sums, mut counts) = ([0.0f64; ZONE_COUNT], [0usize; ZONE_COUNT]);
         for (p, zone) in self.zones.iter().enumerate().filter(|(p, _)| inside(*p)) {
             counts[*zone as usize] += 1;
@@ -100,7 +101,7 @@ impl Taken {
     }
 
     /// Moves the change of the contact to where it leaves least, and makes it as wide, to first order and within what is allowed.
-    /// Returns the logarithm of its radius over the marked one.
+    /// Returns the logarithm of its radius over the marked one, which `ln_radius` may say.
     fn straighten(
         &self,
         residual: &mut [Vec<f32>; 3],
@@ -108,7 +109,13 @@ impl Taken {
         wider: &[Plane; 3],
         inside: &impl Fn(usize) -> bool,
         allowed: &Allowed,
+        ln_radius: Option<f64>,
     ) -> f64 {
+        if let Some(ln_radius) = ln_radius {
+            for (plane, wider) in residual.iter_mut().zip(wider) {
+                plane.iter_mut().zip(&wider.values).for_each(|(r, w)| *r -= ln_radius as f32 * w);
+            }
+        }
         let slopes = [0, 1, 2].map(|c| gradient(&change[c]));
         let along = |c: usize, p: usize| {
             [-slopes[c].0.values[p], -slopes[c].1.values[p], wider[c].values[p]].map(f64::from)
@@ -126,6 +133,14 @@ impl Taken {
                 }
             }
         }
+        if ln_radius.is_some() {
+            // The radius is known: only the place is open.
+            for i in 0..3 {
+                products[(i, 2)] = 0.0;
+                products[(2, i)] = 0.0;
+            }
+            (products[(2, 2)], targets[2]) = (1.0, 0.0);
+        }
         let most = [allowed.mark_px, allowed.mark_px, allowed.ln_radius];
         let Some(moved) = Cholesky::new(products).map(|cholesky| cholesky.solve(&targets)) else {
             return 0.0;
@@ -137,6 +152,6 @@ impl Taken {
                 *r -= shown as f32;
             }
         }
-        moved[2]
+        ln_radius.unwrap_or(moved[2])
     }
 }

@@ -3,7 +3,7 @@
 use super::changed::{changed, seen_before, zoomed_plane};
 use super::light::{PressSums, fit};
 use super::taken::{Allowed, Left, Taken};
-use super::{Change, Tried};
+use super::{Change, Light, Tried};
 use crate::grid::Plane;
 use crate::presses::compare::{gel_of, sink_in_fraction};
 use crate::presses::{Circle, Contact, Zone};
@@ -41,7 +41,9 @@ pub(super) struct Day {
     /// What a contact changes more where its radius is larger, by the logarithm of the radius.
     wider: Vec<[Plane; 3]>,
     /// What it leaves.
-    pub(super) same: Vec<Left>,
+    same: Vec<Left>,
+    /// Logarithms of the radii over the marked ones, without any change.
+    pub(super) ln_radii: Vec<f64>,
     allowed: Allowed,
 }
 
@@ -61,10 +63,11 @@ impl Day {
                 [0, 1, 2].map(|c| more[c].zip(&less[c], |a, b| (a - b) / (2.0 * WIDER as f32)))
             })
             .collect();
-        let same = (0..taken.len())
-            .map(|i| taken[i].left(&sensor.rest, &drawn[i], &wider[i], None, &allowed))
-            .collect();
-        Self { sensor, ball_m, taken, drawn, wider, same, allowed }
+        let of = |i: usize, ln_radius: Option<f64>| {
+            taken[i].left(&sensor.rest, &drawn[i], &wider[i], None, &allowed, ln_radius)
+        };
+        let (same, ln_radii) = centred(taken.len(), of);
+        Self { sensor, ball_m, taken, drawn, wider, same, ln_radii, allowed }
     }
 
     /// By how much all levels of a press are shifted under a change.
@@ -74,7 +77,7 @@ impl Day {
         let allowed = Allowed { gain, ..self.allowed };
         let level = |(taken, wider): (&Taken, &[Plane; 3])| {
             let (contact, ball_m) = change.contact(&taken.contact, self.ball_m);
-            taken.left(&sensor.rest, &draw(&sensor, &contact, ball_m), wider, None, &allowed).level
+            taken.left(&sensor.rest, &draw(&sensor, &contact, ball_m), wider, None, &allowed, None).level
         };
         self.taken.iter().zip(&self.wider).map(level).collect()
     }
@@ -87,21 +90,24 @@ impl Day {
             Change::Scale { zoom, shift } => Some(seen_before(grid, *zoom, *shift)),
             _ => None,
         };
-        let cost = |i: usize| {
-            let (taken, within) = (&self.taken[i], within.as_deref());
-            let (contact, ball_m) = change.contact(&taken.contact, self.ball_m);
-            let drawn = draw(&sensor, &contact, ball_m);
-            let left = taken.left(&sensor.rest, &drawn, &self.wider[i], within, &self.allowed);
-            match within {
-                None => left.against(&self.same[i]),
-                Some(_) => {
-                    let same =
-                        taken.left(&self.sensor.rest, &self.drawn[i], &self.wider[i], within, &self.allowed);
-                    left.against(&same)
-                }
-            }
+        let within = within.as_deref();
+        let drawn: Vec<[Plane; 3]> = self
+            .taken
+            .iter()
+            .map(|taken| {
+                let (contact, ball_m) = change.contact(&taken.contact, self.ball_m);
+                draw(&sensor, &contact, ball_m)
+            })
+            .collect();
+        let n = self.taken.len();
+        let of = |rest: &[Vec<f32>; 3], drawn: &[[Plane; 3]], i: usize, ln_radius: Option<f64>| {
+            self.taken[i].left(rest, &drawn[i], &self.wider[i], within, &self.allowed, ln_radius)
         };
-        (0..self.taken.len()).map(cost).collect()
+        let (left, _) = centred(n, |i, ln_radius| of(&sensor.rest, &drawn, i, ln_radius));
+        let masked =
+            within.map(|_| centred(n, |i, ln_radius| of(&self.sensor.rest, &self.drawn, i, ln_radius)).0);
+        let same = masked.as_ref().unwrap_or(&self.same);
+        left.iter().zip(same).map(|(left, same)| left.against(same)).collect()
     }
 
     pub(super) fn light(&self) -> Tried {
@@ -116,19 +122,27 @@ impl Day {
         let without = |left_out: Option<usize>| {
             fit(sums.iter().enumerate().filter(move |(i, _)| Some(*i) != left_out).map(|(_, sums)| sums))
         };
-        let (mut gains, mut folds) = (Vec::new(), Vec::new());
-        for (i, taken) in self.taken.iter().enumerate() {
-            let light = without(Some(i));
-            let width = taken.width;
-            let on = |planes: [&[f32]; 3]| light.on(planes, width);
-            let rest = on([0, 1, 2].map(|c| &self.sensor.rest[c][..]));
-            let change = on([0, 1, 2].map(|c| &self.drawn[i][c].values[..]));
-            let wider = on([0, 1, 2].map(|c| &self.wider[i][c].values[..]));
-            let plane = |values: Vec<f32>| Plane { width, height: values.len() / width, values };
-            let (change, wider) = (change.map(plane), wider.map(plane));
-            gains.push(-taken.left(&rest, &change, &wider, None, &allowed).against(&self.same[i]));
-            folds.push(Change::Light(Box::new(light)));
-        }
+        let width = self.sensor.grid.width_px;
+        let plane = |values: Vec<f32>| Plane { width, height: values.len() / width, values };
+        let lights: Vec<Light> = (0..self.taken.len()).map(|i| without(Some(i))).collect();
+        let drawn: Vec<[[Plane; 3]; 2]> = lights
+            .iter()
+            .enumerate()
+            .map(|(i, light)| {
+                let on = |planes: &[Plane; 3]| {
+                    light.on([0, 1, 2].map(|c| &planes[c].values[..]), width).map(plane)
+                };
+                [on(&self.drawn[i]), on(&self.wider[i])]
+            })
+            .collect();
+        let rests: Vec<[Vec<f32>; 3]> =
+            lights.iter().map(|light| light.on([0, 1, 2].map(|c| &self.sensor.rest[c][..]), width)).collect();
+        let (left, _) = centred(self.taken.len(), |i, ln_radius| {
+            let [change, wider] = &drawn[i];
+            self.taken[i].left(&rests[i], change, wider, None, &allowed, ln_radius)
+        });
+        let gains = left.iter().zip(&self.same).map(|(left, same)| -left.against(same)).collect();
+        let folds = lights.into_iter().map(|light| Change::Light(Box::new(light))).collect();
         Tried { change: Change::Light(Box::new(without(None))), folds, gains }
     }
 
@@ -310,8 +324,17 @@ fn between(values: &[f64], at: usize) -> f64 {
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }
 
+/// What is left of presses whose marks scatter, but are as wide as they ought to be together: a factor that all share is a change.
+/// Returns the logarithms of the radii too.
+fn centred(n: usize, left: impl Fn(usize, Option<f64>) -> Left) -> (Vec<Left>, Vec<f64>) {
+    let ln_radii: Vec<f64> = (0..n).map(|i| left(i, None).ln_radius).collect();
+    let mean = ln_radii.iter().sum::<f64>() / n.max(1) as f64;
+    let each = ln_radii.iter().enumerate().map(|(i, ln_radius)| left(i, Some(ln_radius - mean)));
+    (each.collect(), ln_radii)
+}
+
 /// What a sensor draws of a contact.
-fn draw(sensor: &Sensor, contact: &Contact, ball_m: f64) -> [Plane; 3] {
+pub(super) fn draw(sensor: &Sensor, contact: &Contact, ball_m: f64) -> [Plane; 3] {
     let gel = gel_of(sensor);
     let renderer = Renderer { sensor, gel: &gel, level: SimdLevel::best() };
     let contact = contact.within(ball_m, &sensor.grid);

@@ -9,6 +9,9 @@ const TIMES_SE: f64 = 2.0;
 /// zone is enough. Presses of the day of the calibration gain up to 0.3 by chance.
 const LEAST_GAIN: f64 = 0.4;
 
+/// An explanation that loses less than this share of what the best one gains is as good: gels are tried at steps.
+const SHARE: f64 = 0.1;
+
 /// A mark is taken at its word within this, as logarithm of its radius: hand-drawn circles are unsure by five per cent.
 const RADIUS: f64 = 0.05;
 
@@ -55,13 +58,19 @@ pub(super) fn decide(
                     _ => false,
                 }
         });
-        best = other.filter(|&i| loss(&tried[at], &tried[i]) < TIMES_SE).or(best);
+        best = other.filter(|&i| is_as_good(&tried[at], &tried[i])).or(best);
     }
     let none =
         (off && best.is_none()).then(|| tried.iter().position(|t| matches!(t.change, Change::Force { .. })));
     let best = best.or(none.flatten());
     let list = explanations(&tried, best, holds);
     (best.and_then(|i| tried.into_iter().nth(i)), list)
+}
+
+/// Whether an explanation loses next to nothing against the best one.
+fn is_as_good(best: &Tried, other: &Tried) -> bool {
+    let (most, gain) = (mean_and_se(&best.gains).0, mean_and_se(&other.gains).0);
+    loss(best, other) < TIMES_SE || most - gain < SHARE * most
 }
 
 /// Loss of one explanation against another, in standard errors over the presses.
@@ -85,14 +94,14 @@ fn explanations(tried: &[Tried], best: Option<usize>, holds: impl Fn(&Tried) -> 
     let raw: Vec<f64> = list
         .iter()
         .map(|(t, holds)| {
-            let t = loss(winner, t);
+            let t = if is_as_good(winner, t) { loss(winner, t).min(1.0) } else { loss(winner, t) };
             if *holds { libm::exp(-0.5 * t * t) } else { 0.0 }
         })
         .collect();
     let total: f64 = raw.iter().sum();
     let each = list.iter().zip(&raw).map(|((t, holds), raw)| {
         let (gain, gain_se) = mean_and_se(&t.gains);
-        let ties = *holds && loss(winner, t) < TIMES_SE && !std::ptr::eq(*t, winner);
+        let ties = *holds && is_as_good(winner, t) && !std::ptr::eq(*t, winner);
         Explanation { cause: t.change.cause(), gain, gain_se, weight: raw / total.max(1e-300), ties }
     });
     each.collect()
