@@ -42,7 +42,11 @@ const LEVEL: f64 = 2.6;
 /// Marks that people make are off by so many pixels.
 const MARK_PX: f64 = 2.0;
 
-/// Logarithm of a radius over the marked one.
+/// Marks are taken at their word within this, as the logarithm of a factor that all radii share: hand-drawn circles are unsure by five
+/// per cent.
+const RADIUS: f64 = 0.05;
+
+/// Logarithm of the radius of one contact over the marked one.
 const LN_RADIUS: f64 = 0.2;
 
 /// Gains of a camera that balances its colours may be so many standard deviations away from the usual ones.

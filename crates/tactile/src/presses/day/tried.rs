@@ -3,7 +3,7 @@
 use super::changed::{changed, seen_before, zoomed_plane};
 use super::light::{PressSums, fit};
 use super::taken::{Allowed, Left, Taken};
-use super::{Change, Light, Tried};
+use super::{Change, Light, RADIUS, Tried};
 use crate::grid::Plane;
 use crate::presses::compare::{gel_of, sink_in_fraction};
 use crate::presses::{Circle, Contact, Zone};
@@ -324,12 +324,13 @@ fn between(values: &[f64], at: usize) -> f64 {
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }
 
-/// What is left of presses whose marks scatter, but are as wide as they ought to be together: a factor that all share is a change.
-/// Returns the logarithms of the radii too.
+/// What is left of presses whose marks scatter, but together are as wide as they ought to be within what marks are unsure by: a
+/// factor beyond that, which all share, is a change. Returns the logarithms of the radii too.
 fn centred(n: usize, left: impl Fn(usize, Option<f64>) -> Left) -> (Vec<Left>, Vec<f64>) {
     let ln_radii: Vec<f64> = (0..n).map(|i| left(i, None).ln_radius).collect();
     let mean = ln_radii.iter().sum::<f64>() / n.max(1) as f64;
-    let each = ln_radii.iter().enumerate().map(|(i, ln_radius)| left(i, Some(ln_radius - mean)));
+    let beyond = mean - mean.clamp(-RADIUS, RADIUS);
+    let each = ln_radii.iter().enumerate().map(|(i, ln_radius)| left(i, Some(ln_radius - beyond)));
     (each.collect(), ln_radii)
 }
 

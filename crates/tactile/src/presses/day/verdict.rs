@@ -1,6 +1,6 @@
 //! Which explanation holds, and which ones hold as well.
 
-use super::{Change, Explanation, Tried};
+use super::{Change, Explanation, RADIUS, Tried};
 
 /// An explanation counts from so many standard errors of its gain on, over the presses.
 const TIMES_SE: f64 = 2.0;
@@ -11,9 +11,6 @@ const LEAST_GAIN: f64 = 0.4;
 
 /// An explanation that loses less than this share of what the best one gains is as good: gels are tried at steps.
 const SHARE: f64 = 0.1;
-
-/// A mark is taken at its word within this, as logarithm of its radius: hand-drawn circles are unsure by five per cent.
-const RADIUS: f64 = 0.05;
 
 /// Mean and its standard error.
 pub(super) fn mean_and_se(values: &[f64]) -> (f64, f64) {
