@@ -1,11 +1,13 @@
 //! A sensor file against presses: predicted and real image of each.
 
 use super::contact::{MarkError, ZONES, Zone, checked};
-use super::dots::predict_dotted;
+use super::dots::{followed, press_shear};
 use super::gain::within_gain;
 use super::{Contact, Press, PressSet};
 use crate::convolve::Follow;
+use crate::markers::{Markers, marker_displacements_by_surface};
 use crate::metrics::{MetricError, Score, mean_score, score, score_where};
+use crate::noise::finish;
 use crate::render::Renderer;
 use crate::sensor::{Pyramid, Sensor};
 use crate::simd::SimdLevel;
@@ -204,6 +206,26 @@ pub(super) fn predict_taken(press: &Press, contact: &Contact, ball_m: f64, senso
         Some(sd) => within_gain(&press.image, &image, contact, &sensor.grid, sd.map(f64::from)),
         None => image,
     }
+}
+
+/// The image that a sensor with dots predicts for a contact. How far the press drags the gel sideways is no matter of the sensor: it is taken
+/// from the dots of the real image, by least squares.
+fn predict_dotted(
+    image: &TactileImage,
+    contact: &Contact,
+    ball_m: f64,
+    sensor: &Sensor,
+    markers: &Markers,
+) -> TactileImage {
+    let gel = gel_of(sensor);
+    let renderer = Renderer { sensor, gel: &gel, level: SimdLevel::best() };
+    let imprint = contact.imprint(ball_m, &sensor.grid, &sensor.gel_shape, sink_in_fraction(sensor));
+    let surface = renderer.surface(&imprint);
+    let shear = press_shear(&surface, &sensor.grid, markers, &followed(image, markers));
+    let moved = marker_displacements_by_surface(&surface, sensor.grid.metres_per_px, shear, &markers.rest_px);
+    let mut change = renderer.unmarked_change(&imprint);
+    renderer.draw_moved(&moved, &mut change);
+    finish(sensor, Some(&change), None)
 }
 
 /// The image of a contact, without noise.

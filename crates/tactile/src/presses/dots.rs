@@ -3,14 +3,9 @@
 //! A dot hides the colour of the gel, and a contact moves it by several pixels. A fit therefore leaves out the pixels of the dots at rest and of
 //! the dots in each press; filling them in does not help. Errors are reported outside and inside of these pixels.
 
-use super::compare::{gel_of, sink_in_fraction};
-use super::{Contact, Press, PressSet, reference_frame};
+use super::{Press, PressSet, reference_frame};
 use crate::grid::{Grid, Plane, levels_of};
 use crate::markers::{Markers, find_dots, follow_dots, height_and_slope, marker_displacements_by_surface};
-use crate::noise::finish;
-use crate::render::Renderer;
-use crate::sensor::Sensor;
-use crate::simd::SimdLevel;
 use gripgen_twin::TactileImage;
 use std::sync::Arc;
 
@@ -45,7 +40,7 @@ impl PressSet {
 }
 
 /// Where each marker is in an image; `None` of one that is not seen.
-fn followed(image: &TactileImage, markers: &Markers) -> Vec<Option<[f64; 2]>> {
+pub(super) fn followed(image: &TactileImage, markers: &Markers) -> Vec<Option<[f64; 2]>> {
     let found = find_dots(&levels_of(image), image.width_px as usize, image.height_px as usize);
     let of_rest = follow_dots(&found, &markers.rest_px);
     of_rest.into_iter().map(|dot| dot.map(|i| found[i].centre_px)).collect()
@@ -73,28 +68,13 @@ fn hidden(image: &TactileImage, markers: &Markers) -> Arc<[bool]> {
     hidden.into()
 }
 
-/// The image that a sensor with dots predicts for a contact. How far the press drags the gel sideways is no matter of the sensor: it is taken
-/// from the dots of the real image, by least squares.
-pub(super) fn predict_dotted(
-    image: &TactileImage,
-    contact: &Contact,
-    ball_m: f64,
-    sensor: &Sensor,
-    markers: &Markers,
-) -> TactileImage {
-    let gel = gel_of(sensor);
-    let renderer = Renderer { sensor, gel: &gel, level: SimdLevel::best() };
-    let imprint = contact.imprint(ball_m, &sensor.grid, &sensor.gel_shape, sink_in_fraction(sensor));
-    let surface = renderer.surface(&imprint);
-    let shear = press_shear(&surface, &sensor.grid, markers, &followed(image, markers));
-    let moved = marker_displacements_by_surface(&surface, sensor.grid.metres_per_px, shear, &markers.rest_px);
-    let mut change = renderer.unmarked_change(&imprint);
-    renderer.draw_moved(&moved, &mut change);
-    finish(sensor, Some(&change), None)
-}
-
 /// The sideways displacement of the surface for each pixel of height that moves markers to where they are seen.
-fn press_shear(surface_px: &Plane, grid: &Grid, markers: &Markers, seen: &[Option<[f64; 2]>]) -> [f64; 2] {
+pub(super) fn press_shear(
+    surface_px: &Plane,
+    grid: &Grid,
+    markers: &Markers,
+    seen: &[Option<[f64; 2]>],
+) -> [f64; 2] {
     let unsheared =
         marker_displacements_by_surface(surface_px, grid.metres_per_px, [0.0; 2], &markers.rest_px);
     let (mut products, mut squares) = ([0.0; 2], 0.0);
