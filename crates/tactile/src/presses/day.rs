@@ -41,7 +41,7 @@ const FIT_WIDTH_PX: usize = 120;
 /// An even shift of a colour that a session may have, grey levels: twice the 1.3 that real ones have.
 const LEVEL: f64 = 2.6;
 
-/// Marks that people make are off by so many pixels.
+/// Error of marks that people make, pixels.
 const MARK_PX: f64 = 2.0;
 
 /// Marks are taken at their word within this, as the logarithm of a factor that all radii share: hand-drawn circles are unsure by five
@@ -51,7 +51,7 @@ const RADIUS: f64 = 0.05;
 /// Logarithm of the radius of one contact over the marked one.
 const LN_RADIUS: f64 = 0.2;
 
-/// Gains of a camera that balances its colours may be so many standard deviations away from the usual ones.
+/// Largest deviation of the gains of a camera that balances its colours, in standard deviations.
 const MAX_DEVIATIONS: f64 = 2.5;
 
 /// What may have changed.
@@ -70,7 +70,7 @@ pub enum Change {
     },
     /// The scale of the camera.
     Scale {
-        /// Pixels of today on a length of the gel, for each of before.
+        /// Today's pixels on a length of the gel over those of the sensor file.
         zoom: f64,
         /// Where the camera looks, in half widths of the frame.
         shift: [f64; 2],

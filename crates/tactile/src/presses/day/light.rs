@@ -1,4 +1,4 @@
-//! Another light: each colour of today as a mixture of the colours of before and a smooth gain over the frame.
+//! Another light: each colour of today as a mixture of the colours of the sensor file, with a smooth gain over the frame.
 //!
 //! `today_c = sum_d m_cd before_d + (f_c1 u + f_c2 v + f_c3 u^2 + f_c4 u v + f_c5 v^2) before_c`. Light adds up, so what the lights do to
 //! the frame at rest they do to the change of a contact. That is linear in the eight numbers of a colour, and a fit follows from
@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1.0 / 12.0;
 /// What became of the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Light {
-    /// Red, green and blue of today out of red, green and blue of before.
+    /// Red, green and blue of today from those of the sensor file.
     pub mixture: [[f64; 3]; 3],
     /// Gain of each colour over the frame: terms `u, v, u^2, u v, v^2`, -1 to 1 along the width.
     pub field: [[f64; FIELD]; 3],

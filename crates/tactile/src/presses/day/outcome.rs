@@ -12,7 +12,7 @@ use gripgen_twin::TactileImage;
 /// A sensor explains contacts where it leaves less than this share of what they change.
 const UNEXPLAINED: f64 = 0.5;
 
-/// The frame at rest is explained where presses differ from it by less than so many times what they differ by among themselves, in
+/// The frame at rest is explained where presses differ from it by less than this multiple of what they differ by among themselves, in
 /// squares.
 const FRAME_TIMES: f64 = 4.0;
 
@@ -69,7 +69,7 @@ fn levelled(mut sensor: Sensor, level: [f64; 3]) -> Sensor {
     sensor
 }
 
-/// What the presses look like beside what is drawn of them.
+/// What the presses look like, and what is drawn of them.
 pub(super) struct Outcome {
     pub(super) cost: GreyCost,
     pub(super) drawn: Vec<TactileImage>,

@@ -4,7 +4,7 @@ use super::Spot;
 use crate::presses::{ZONES, Zone};
 use gripgen_twin::TactileImage;
 
-/// A spot differs from its surroundings by so many times what pixels of its zone do, and by so many grey levels.
+/// How far a spot differs from its surroundings: this multiple of what pixels of its zone do, and this many grey levels.
 const TIMES: f32 = 6.0;
 const LEAST: f32 = 8.0;
 
@@ -12,7 +12,7 @@ const LEAST: f32 = 8.0;
 const AROUND_PX: usize = 8;
 const LEAST_PX: usize = 6;
 
-/// At most so many spots are named.
+/// Spots that are named, at most.
 const MOST: usize = 8;
 
 /// How much larger than life the map is.

@@ -28,10 +28,10 @@ const WIDER: f64 = 0.03;
 /// Rounds of a search for the place about which the frame is zoomed.
 const ROUNDS: usize = 5;
 
-/// A move of the frame is looked for at every so many pixels along rows and columns.
+/// Distance of the pixels, along rows and columns, at which a move of the frame is looked for.
 const STRIDE: usize = 2;
 
-/// Presses of a day beside what a sensor file says of them.
+/// Presses of a day, and what a sensor file says of them.
 pub(super) struct Day {
     pub(super) sensor: Sensor,
     pub(super) ball_m: f64,
@@ -315,7 +315,7 @@ fn sum(costs: &[f64], left_out: Option<usize>) -> f64 {
     costs.iter().enumerate().filter(|(i, _)| Some(*i) != left_out).map(|(_, cost)| cost).sum()
 }
 
-/// How far beside the lowest of some values, which are a step apart, the parabola through it and its neighbours has its lowest point.
+/// How far from the lowest of some values, which are a step apart, the parabola through it and its neighbours has its lowest point.
 fn between(values: &[f64], at: usize) -> f64 {
     let (Some(before), Some(after)) = (at.checked_sub(1).map(|i| values[i]), values.get(at + 1)) else {
         return 0.0;

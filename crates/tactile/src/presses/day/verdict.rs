@@ -2,7 +2,7 @@
 
 use super::{Change, Explanation, RADIUS, Tried};
 
-/// An explanation counts from so many standard errors of its gain on, over the presses.
+/// Least gain of an explanation that counts, in standard errors over the presses.
 const TIMES_SE: f64 = 2.0;
 
 /// What an explanation has to gain at least: the sum over the zones of the logarithm of the error, so that a third of the error of one
