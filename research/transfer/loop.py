@@ -79,7 +79,7 @@ def swept(name: str, text: str, work: Path, samples: int, rig_key: str = "") -> 
         """Sweeps, reads, and shows each grip under other lights too."""
         config, run = work / f"{name}.toml", work / f"run-{name}"
         config.write_text(text)
-        keys = [f"samples={samples}", "images.storage=clean", "images.compression=small"]
+        keys = [f"samples={samples}", "images.storage=clean"]
         sets.gripgen("sweep", str(config), *(a for k in keys for a in ("--set", k)), "-j", "1", "-o", str(run), "--quiet", "--allow-constant")
         found = sets.read(run, rig_key)
         other, rng = [], np.random.default_rng(3)
