@@ -22,6 +22,7 @@ NOT_RUN = {
     "pip install": "`cargo xtask test --all` installs into a fresh environment",
     "gripgen calibrate presses": "tests/presses.rs runs it on presses",
     "gripgen compare new-presses": "tests/presses.rs runs it on presses",
+    "gripgen sensor check": "crates/cli/tests/cli/sensor_check.rs runs it on presses",
     "gripgen render part.stl": "crates/cli/tests/cli/presses.rs runs it on a mesh",
     "gripgen sweep mine/sweep.toml": "10 000 samples",
     "python examples/train_grip_metric.py": "needs torch; docs/training.md has its figures",

@@ -314,12 +314,20 @@ pub fn check_day(set: &PressSet, sensor: &Sensor) -> Result<DayCheck, DayError> 
         let outcome = outcome(&settled, &balls, &contacts, set.ball_m, sensor, LEVEL);
         (settled, outcome)
     };
+    let chosen = best.as_ref().map_or(Cause::Nothing, |best| best.change.cause());
+    let sized = chosen == Cause::Gel && explanations.iter().any(|e| e.cause == Cause::Force && e.ties);
     let (mut settled, mut found) = judge(best);
+    // A change that makes the images of presses worse that it was not fitted to is none.
+    if sized && !found.cost.is_lower(Cause::Gel) {
+        (settled, found) = judge(Some(of_radii(seen)));
+    }
     if !found.cost.is_lower(settled.change.cause()) {
-        // A change that makes the images of presses worse that it was not fitted to is none.
         (settled, found) = judge(None);
+    }
+    let cause = settled.change.cause();
+    if cause != chosen {
         for e in &mut explanations {
-            (e.weight, e.ties) = (if e.cause == Cause::Nothing { 1.0 } else { 0.0 }, false);
+            (e.weight, e.ties) = (if e.cause == cause { 1.0 } else { 0.0 }, false);
         }
     }
     let Outcome { cost, drawn, map, spots, explained } = found;

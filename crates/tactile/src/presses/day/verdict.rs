@@ -57,9 +57,21 @@ pub(super) fn decide(
         });
         best = other.filter(|&i| is_as_good(&tried[at], &tried[i])).or(best);
     }
-    let none =
-        (off && best.is_none()).then(|| tried.iter().position(|t| matches!(t.change, Change::Force { .. })));
-    let best = best.or(none.flatten());
+    // Contacts of another size and images that need nothing else: the same two, as far as the gel explains anything.
+    let sizes = off && best.is_none();
+    let of_size = |t: &Tried| match t.change {
+        Change::Force { .. } => true,
+        Change::Gel { .. } => mean(t) > 0.0,
+        _ => false,
+    };
+    if sizes {
+        let at = |force: bool| {
+            let named = |t: &Tried| of_size(t) && matches!(t.change, Change::Force { .. }) == force;
+            tried.iter().position(named)
+        };
+        best = at(measured_depths).or(at(true));
+    }
+    let holds = |t: &Tried| holds(t) || (sizes && of_size(t));
     let list = explanations(&tried, best, holds);
     (best.and_then(|i| tried.into_iter().nth(i)), list)
 }
@@ -145,6 +157,9 @@ mod tests {
         assert_eq!(decided(list(), 0.15, false), (Cause::Gel, vec![Cause::Force]));
         assert_eq!(decided(list(), 0.15, true), (Cause::Force, vec![Cause::Gel]));
         // Contacts of another size, and images that need nothing else.
+        let little = tried(gel(), [0.1, 0.2, 0.1, 0.3, 0.2]);
+        let force = tried(Change::Force { factor: 1.2 }, [0.1, 0.3, 0.1, 0.2, 0.2]);
+        assert_eq!(decided(vec![little, force], 0.08, false), (Cause::Gel, vec![Cause::Force]));
         let alone = tried(Change::Force { factor: 1.2 }, [0.1, 0.0, 0.1, 0.1, 0.0]);
         assert_eq!(decided(vec![alone], 0.15, false).0, Cause::Force);
     }
