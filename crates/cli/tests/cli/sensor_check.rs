@@ -69,8 +69,8 @@ fn another_light_is_named_and_has_a_file_that_shows_no_change_afterwards() {
     let weights: f64 =
         json["explanations"].as_array().unwrap().iter().map(|e| e["weight"].as_f64().unwrap()).sum();
     assert!((weights - 1.0).abs() < 1e-9);
-    let page = std::fs::read_to_string(page).unwrap();
-    assert!(page.contains("Where something is left") && page.contains("light: the light"), "the page");
+    let shown = std::fs::read_to_string(&page).unwrap();
+    assert!(shown.contains("Where something is left") && shown.contains("light: the light"), "the page");
     // The file of the day holds for that day, and no file is replaced unasked.
     let (again, json) = check(today.to_str().unwrap(), dimmer.path(), &[]);
     assert_code(&again, 0);
