@@ -138,7 +138,7 @@ fn spot_in_words(spot: &Spot) -> String {
 /// What a cause means, and what to do.
 fn meaning(cause: Option<Cause>) -> &'static str {
     match cause {
-        Some(Cause::Nothing) => "nothing changed: the sensor file holds",
+        Some(Cause::Nothing) => "the sensor file holds",
         Some(Cause::Light) => "the light or the camera's gains changed",
         Some(Cause::Gel) => "the gel gives way in another way around contacts",
         Some(Cause::Scale) => "the camera has another scale: a pixel shows another length",

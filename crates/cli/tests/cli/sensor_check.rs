@@ -90,7 +90,7 @@ fn presses_of_the_same_day_change_nothing_and_what_cannot_be_is_refused() {
             && json["doubts"]["spots"] == serde_json::json!([])
     );
     let words = run(&["sensor", "check", SENSOR, same.path().to_str().unwrap(), "--ball-mm", "5"]);
-    assert!(text(&words.stdout).contains("nothing changed"), "{}", text(&words.stdout));
+    assert!(text(&words.stdout).contains("nothing: the sensor file holds"), "{}", text(&words.stdout));
     // A ball that is smaller than its marks: how many, and the smallest that fits.
     let small =
         run(&["sensor", "check", SENSOR, same.path().to_str().unwrap(), "--ball-mm", "3.6", "--json"]);
