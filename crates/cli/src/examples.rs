@@ -119,7 +119,7 @@ mod tests {
             }
             verbs += 1;
         }
-        assert_eq!(verbs, 27, "a new verb gets an example");
+        assert_eq!(verbs, 28, "a new verb gets an example");
     }
 
     /// Texts of the program that stand between back quotes and begin with its name.
