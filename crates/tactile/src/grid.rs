@@ -52,6 +52,31 @@ pub(crate) fn added(heights: Plane, rest: Option<&Plane>) -> Plane {
     }
 }
 
+/// Sets of marked pixels that touch along a side, each in rising order, by their first pixels. `marked` is row by row.
+pub(crate) fn islands(mut marked: Vec<bool>, width: usize) -> Vec<Vec<usize>> {
+    let mut islands = Vec::new();
+    for first in 0..marked.len() {
+        if !std::mem::take(&mut marked[first]) {
+            continue;
+        }
+        let (mut island, mut next) = (vec![first], 0);
+        while let Some(&pixel) = island.get(next) {
+            next += 1;
+            let (x, end) = (pixel % width, marked.len());
+            let sides = [
+                (x > 0).then(|| pixel - 1),
+                (x + 1 < width).then_some(pixel + 1),
+                pixel.checked_sub(width),
+                Some(pixel + width).filter(|&below| below < end),
+            ];
+            island.extend(sides.into_iter().flatten().filter(|&side| std::mem::take(&mut marked[side])));
+        }
+        island.sort_unstable();
+        islands.push(island);
+    }
+    islands
+}
+
 /// One number per pixel, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plane {

@@ -94,7 +94,7 @@ impl Markers {
 }
 
 /// Columns and rows, from and to, within `reach` of any of the centres.
-fn window(reach: f64, centres: &[[f64; 2]], width: usize, height: usize) -> [usize; 4] {
+pub(crate) fn window(reach: f64, centres: &[[f64; 2]], width: usize, height: usize) -> [usize; 4] {
     let range = |axis: usize, end: usize| {
         let low = centres.iter().map(|c| c[axis]).fold(f64::INFINITY, f64::min) - reach;
         let high = centres.iter().map(|c| c[axis]).fold(f64::NEG_INFINITY, f64::max) + reach;

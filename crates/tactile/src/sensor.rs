@@ -16,6 +16,9 @@ use crate::markers::Markers;
 use crate::shadow::Shadow;
 use gripgen_twin::TactileImage;
 
+/// Largest share of a press by which a gel may give way.
+pub(crate) const MAX_SINK_IN: f64 = 0.9;
+
 /// A tactile sensor, as read from a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
@@ -108,7 +111,7 @@ impl Sensor {
             }
             let (restored, sunk) = (pyramid.restore_depth_fraction, pyramid.sink_in_fraction);
             check_range("restore_depth_fraction", [restored], 0.0..=1.0, "from 0 to 1")?;
-            check_range("sink_in_fraction", [sunk], 0.0..=0.9, "from 0 to 0.9")?;
+            check_range("sink_in_fraction", [sunk], 0.0..=MAX_SINK_IN, "from 0 to 0.9")?;
         }
         Ok(self)
     }

@@ -28,6 +28,22 @@ pub fn median(mut numbers: Vec<f64>) -> Option<f64> {
     numbers.get(numbers.len() / 2).copied()
 }
 
+/// 95 % quantile of Student's t (Hill 1970, leading terms; within 1 % from 3 degrees of freedom on, of its table).
+pub fn t_quantile_95(freedom: f64) -> f64 {
+    let z: f64 = 1.644_853_6;
+    let v = freedom.max(1.0);
+    if v < 1.5 {
+        return 6.313_752;
+    }
+    if v < 2.5 {
+        return 2.919_986;
+    }
+    let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
+    z + (z3 + z) / (4.0 * v)
+        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * v * v)
+        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * v * v * v)
+}
+
 /// How many different numbers there are; those that are none are one.
 pub fn distinct(numbers: &[f64]) -> usize {
     // Zeros are equal, whatever their sign.

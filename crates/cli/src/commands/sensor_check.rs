@@ -56,7 +56,7 @@ pub fn run(args: &SensorCheckArgs) -> Result<u8, Failure> {
         return Err(Failure::new(
             "none of the changes that were tried explains these presses, so there is no file for this day",
         )
-        .hint("calibrate anew: `gripgen calibrate presses` with 30 presses"));
+        .hint("calibrate again: `gripgen calibrate presses` with 30 presses"));
     }
     sink.finish(args.talk.quiet, document, || {
         let path = written.map_or_else(String::new, |path| format!("{}\n", path.display()));
@@ -146,7 +146,7 @@ fn meaning(cause: Option<Cause>) -> &'static str {
             "slopes in the contacts are those of a ball of another diameter; the sensor file stays"
         }
         Some(Cause::Force) => "contacts have another size than marks or depths say; the sensor file stays",
-        None => "nothing that was tried explains these presses: calibrate anew",
+        None => "nothing that was tried explains these presses: calibrate again",
     }
 }
 

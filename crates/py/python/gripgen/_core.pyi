@@ -17,6 +17,8 @@ __all__ = [
     "Stream",
     "__version__",
     "contact_sheet_shards",
+    "dots",
+    "imprint_volumes_mm3",
     "prepare_run",
     "render",
     "rig_check",

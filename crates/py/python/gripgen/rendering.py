@@ -87,7 +87,8 @@ def imprint_volume_mm3(
 
     `images` are uint8 (N, H, W, 3), or one (H, W, 3); `sensor` is the sensor file that was calibrated for them, `rest` an image without contact (that of the
     file without it). Returns float64[N]. Slopes are read from colours and integrated, as `calibrate imprints` does it; a change that the whole frame shares
-    is taken for the exposure. The common factor is right to some 10 % on balls (docs/diagnosis-imprints.md).
+    is taken for the exposure. On drawn balls of 6 to 30 mm
+    the volume is 0.8 to 1.0 of the true one with `gelsight_taxim` and 1.0 to 1.5 with `gelsight_r15`, the most for the smallest ball.
 
     Raises ConfigError for a file that is no sensor, and for images of another size than the sensor's.
     """

@@ -1,7 +1,7 @@
 //! Dots in an image: the dark islands that a closing by a disc fills.
 
 use super::Markers;
-use crate::grid::{Grid, Plane};
+use crate::grid::{Grid, Plane, islands};
 
 /// Width of the image that the three numbers below were measured on. With them all 63 dots of a GelSight Mini with dots are found in each of
 /// 26 presses, 0.2 px (median) from the places that its owners state (yepengfei81-cpu/gelsight_gripper_controller, 2026).
@@ -37,8 +37,9 @@ pub fn find_dots(levels: &[Vec<f32>; 3], width_px: usize, height_px: usize) -> V
     let closed = negative(&widened(&negative(&widened(&light, radius_px)), radius_px));
     let taken = closed.zip(&light, |closed, light| (closed - light) / closed.max(1.0));
     let (least, most) = (AREA_PX.0 * scale * scale, AREA_PX.1 * scale * scale);
+    let dark = taken.values.iter().map(|&share| share > DARKER).collect();
     let islands =
-        islands(&taken).into_iter().filter(|island| (least..=most).contains(&(island.len() as f64)));
+        islands(dark, width_px).into_iter().filter(|island| (least..=most).contains(&(island.len() as f64)));
     islands.map(|pixels| Dot { centre_px: centre(&taken, &pixels), pixels }).collect()
 }
 
@@ -139,33 +140,6 @@ fn along_rows(plane: &Plane, half: usize) -> Plane {
         values.extend(run);
     }
     Plane { values, ..*plane }
-}
-
-/// Sets of pixels darker than [`DARKER`] that touch along a side.
-fn islands(taken: &Plane) -> Vec<Vec<usize>> {
-    let (width, height) = (taken.width, taken.height);
-    let mut open: Vec<bool> = taken.values.iter().map(|&share| share > DARKER).collect();
-    let mut islands = Vec::new();
-    for first in 0..open.len() {
-        if !std::mem::take(&mut open[first]) {
-            continue;
-        }
-        let (mut island, mut next) = (vec![first], 0);
-        while let Some(&pixel) = island.get(next) {
-            next += 1;
-            let (x, y) = (pixel % width, pixel / width);
-            let sides = [
-                (x > 0).then(|| pixel - 1),
-                (x + 1 < width).then_some(pixel + 1),
-                (y > 0).then(|| pixel - width),
-                (y + 1 < height).then_some(pixel + width),
-            ];
-            island.extend(sides.into_iter().flatten().filter(|&side| std::mem::take(&mut open[side])));
-        }
-        island.sort_unstable();
-        islands.push(island);
-    }
-    islands
 }
 
 fn centre(taken: &Plane, pixels: &[usize]) -> [f64; 2] {

@@ -1,6 +1,6 @@
 //! Relief of a part's surface: what a scraped, milled or printed face shows in the image between its edges.
 //!
-//! On real sensors the texture of a flat contact is no noise: it is correlated by 0.74 to 0.80 between presses of growing depth, and
+//! On real sensors the texture of a flat contact is not noise: it is correlated by 0.74 to 0.80 between presses of growing depth, and
 //! its spectrum falls below 2 per mm (a prism printed for a GelSight, Chen et al. 2022). So it is a height that is fixed to the part, white noise
 //! through a Gaussian.
 
@@ -9,7 +9,7 @@ use crate::grid::Grid;
 use crate::indent::Imprint;
 use gripgen_twin::OpticsState;
 use gripgen_twin::frames::Pose;
-use gripgen_twin::random::splitmix64;
+use gripgen_twin::random::{normal_quantile, splitmix64};
 use nalgebra::{Point3, Vector3};
 use std::sync::OnceLock;
 
@@ -65,10 +65,8 @@ fn pattern() -> &'static [f32] {
     static PATTERN: OnceLock<Vec<f32>> = OnceLock::new();
     PATTERN.get_or_init(|| {
         let mut state = 1;
-        // Twelve uniform numbers less six: normal enough, and the blur sums a hundred of them.
-        let unit = |state: &mut u64| (splitmix64(state) >> 11) as f64 / (1u64 << 53) as f64;
-        let white = (0..POINTS * POINTS).map(|_| (0..12).map(|_| unit(&mut state)).sum::<f64>() - 6.0);
-        let white: Vec<f64> = white.collect();
+        let mut unit = || ((splitmix64(&mut state) >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
+        let white: Vec<f64> = (0..POINTS * POINTS).map(|_| normal_quantile(unit())).collect();
         let weights = discrete_gaussian(SMOOTHING_M / PITCH_M);
         let half = weights.len() / 2;
         let along = |values: &[f64], place: fn(usize, usize) -> usize| -> Vec<f64> {

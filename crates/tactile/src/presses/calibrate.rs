@@ -9,6 +9,7 @@ mod samples;
 #[cfg(test)]
 mod tests;
 
+pub(super) use gel::MAX_KERNEL_PX;
 pub(super) use resized::Resized;
 pub use ridge::Smoothness;
 

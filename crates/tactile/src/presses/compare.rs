@@ -208,7 +208,7 @@ pub(super) fn predict_taken(press: &Press, contact: &Contact, ball_m: f64, senso
     }
 }
 
-/// The image that a sensor with dots predicts for a contact. How far the press drags the gel sideways is no matter of the sensor: it is taken
+/// The image that a sensor with dots predicts for a contact. How far the press drags the gel sideways is not a property of the sensor: it is taken
 /// from the dots of the real image, by least squares.
 fn predict_dotted(
     image: &TactileImage,

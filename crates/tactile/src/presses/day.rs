@@ -21,8 +21,8 @@ pub use light::Light;
 
 use super::calibrate::MIN_PRESSES;
 use super::contact::{MarkError, WIDEST, Zone, checked};
-use super::gain::{away, gain_of, with_gain};
-use super::{Circle, Contact, Press, PressScene, PressSet};
+use super::gain::{MAX_DEVIATIONS, away, gain_of, with_gain};
+use super::{Circle, Contact, Press, PressScene, PressSet, ZONES};
 use crate::grid::levels_of;
 use crate::sensor::Sensor;
 use gripgen_twin::TactileImage;
@@ -33,7 +33,7 @@ use tried::{Day, draw};
 use verdict::{decide, mean_and_se};
 
 /// Zones around a contact.
-const ZONE_COUNT: usize = 4;
+const ZONE_COUNT: usize = ZONES.len();
 
 /// Narrowest image that is fitted to.
 const FIT_WIDTH_PX: usize = 120;
@@ -50,9 +50,6 @@ const RADIUS: f64 = 0.05;
 
 /// Logarithm of the radius of one contact over the marked one.
 const LN_RADIUS: f64 = 0.2;
-
-/// Largest deviation of the gains of a camera that balances its colours, in standard deviations.
-const MAX_DEVIATIONS: f64 = 2.5;
 
 /// What may have changed.
 #[derive(Debug, Clone, PartialEq)]
@@ -264,13 +261,13 @@ pub struct DayCheck {
     pub today: Option<Sensor>,
     /// Errors in grey levels.
     pub cost: GreyCost,
-    /// Names of the presses that were looked at: those of a ball.
+    /// Names of the presses that were used: those of a ball.
     pub names: Vec<String>,
     /// What is drawn of each by a fit that has not seen it.
     pub drawn: Vec<TactileImage>,
-    /// Mean over the presses of what is left, eight times enlarged around a middle grey.
+    /// Mean residual over the presses, eight times enlarged around a middle grey.
     pub map: TactileImage,
-    /// Where the same is left in several presses.
+    /// Places with the same residual in several presses.
     pub spots: Vec<Spot>,
     /// True over stated radius of the contacts, with its 90 % interval.
     pub radius: DayNumber,
@@ -307,8 +304,6 @@ pub fn check_day(set: &PressSet, sensor: &Sensor) -> Result<DayCheck, DayError> 
         Change::Force { .. } => of_radii(seen),
         _ => best,
     });
-    let gains = best.as_ref().map(|best| best.gains.len());
-    debug_assert!(gains.is_none_or(|n| n == balls.len()));
     let judge = |best: Option<Tried>| {
         let settled = Settled::new(&day, best);
         let outcome = outcome(&settled, &balls, &contacts, set.ball_m, sensor, LEVEL);
@@ -407,7 +402,7 @@ fn day(balls: &[&Press], contacts: &[Contact], ball_m: f64, sensor: &Sensor) -> 
         let mut measured = levels_of(&image).map(|plane| means(&plane, full_width, factor));
         let here = contact.in_wider_pixels(factor);
         if factor > 1 {
-            // What the full resolution draws beyond the fit's is no change of the day.
+            // What the full resolution draws beyond the fit's is not a change of the day.
             let (fine, coarse) = (draw(sensor, contact, ball_m), draw(&reduced, &here, ball_m));
             for c in 0..3 {
                 let fine = means(&fine[c].values, full_width, factor);

@@ -5,12 +5,13 @@
 
 use super::{Press, PressSet, reference_frame};
 use crate::grid::{Grid, Plane, levels_of};
-use crate::markers::{Markers, find_dots, follow_dots, height_and_slope, marker_displacements_by_surface};
+use crate::markers::{
+    Markers, find_dots, follow_dots, height_and_slope, marker_displacements_by_surface, window,
+};
 use gripgen_twin::TactileImage;
 use std::sync::Arc;
 
-/// Pixels around a dot that it still darkens, in an image 320 px wide: with 2 the error of a calibration outside of the dots is that of a gel
-/// without dots.
+/// Pixels around a dot that it still darkens, in an image 320 px wide; masks of 2 and 4 px give errors outside of the dots within 6 % of each other (measured apart).
 const RIM_PX: f64 = 2.0;
 
 impl PressSet {
@@ -53,11 +54,7 @@ fn hidden(image: &TactileImage, markers: &Markers) -> Arc<[bool]> {
     let radius_px = markers.radius_px + RIM_PX * width as f64 / 320.0;
     let seen = followed(image, markers).into_iter().flatten();
     for [x, y] in markers.rest_px.iter().copied().chain(seen) {
-        let range = |centre: f64, n: usize| {
-            let end = (centre + radius_px).floor() as i64 + 1;
-            ((centre - radius_px).ceil().max(0.0) as usize, end.clamp(0, n as i64) as usize)
-        };
-        let ((left, right), (top, bottom)) = (range(x, width), range(y, height));
+        let [left, right, top, bottom] = window(radius_px, &[[x, y]], width, height);
         for row in top..bottom {
             for column in left..right {
                 let r2 = (column as f64 - x).powi(2) + (row as f64 - y).powi(2);

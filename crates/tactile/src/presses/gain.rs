@@ -78,7 +78,7 @@ pub(super) fn gain_beside(
 }
 
 /// The gain of a press may be so many standard deviations away from the usual one: what is beyond is no scatter.
-const MAX_DEVIATIONS: f64 = 2.5;
+pub(super) const MAX_DEVIATIONS: f64 = 2.5;
 
 /// A predicted image in the gain of its press, as far as a camera whose gains scatter by `sd` may have it.
 pub(super) fn within_gain(

@@ -24,7 +24,7 @@ pub(super) const FOLLOW: Follow = Follow::Exactly;
 const FINEST_MM: f64 = 0.5;
 const WIDEST_MM: [f64; 4] = [2.0, 4.0, 8.0, 16.0];
 /// Largest kernel.
-const MAX_KERNEL_PX: u32 = 255;
+pub(in crate::presses) const MAX_KERNEL_PX: u32 = 255;
 
 /// Sink-ins that are tried.
 const SINK_INS: [f64; 9] = [0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6];

@@ -137,7 +137,6 @@ fn a_sensor_is_found_through_dots() {
     let dots = found.sensor.markers.unwrap();
     assert_eq!(dots.rest_px.len(), 48);
     assert!((dots.radius_px - 2.4).abs() < 0.3, "{}", dots.radius_px);
-    // A frame that is the same for a gel without dots.
     assert!(found.sensor.noise_rgb.iter().all(|noise| (noise / NOISE - 1.0).abs() < 0.15));
 }
 

@@ -6,17 +6,12 @@ use super::{Change, Light};
 use crate::colour::regressor::{AROUND_FIELD, NEAR, NEAR_FIELD, SURROUNDINGS};
 use crate::colour::{ColourModel, Lambert, Regressor};
 use crate::grid::Grid;
-use crate::sensor::{GelShape, Pyramid, Sensor};
+use crate::presses::calibrate::MAX_KERNEL_PX;
+use crate::sensor::{GelShape, MAX_SINK_IN, Pyramid, Sensor};
 use crate::shadow::Shadow;
 
 /// Terms of the fields of lights.
 const LAMBERT_FIELD: usize = 6;
-
-/// Largest kernel of a sensor file.
-const MAX_KERNEL_PX: f64 = 255.0;
-
-/// Share by which the gel gives way at most.
-const MAX_SINK_IN: f64 = 0.9;
 
 /// The sensor as a change leaves it; of a ball and of marks the same.
 pub(super) fn changed(sensor: &Sensor, change: &Change) -> Sensor {
@@ -43,7 +38,7 @@ fn of_gel(old: &Pyramid, sink_in_fraction: f64, width: f64) -> Pyramid {
 
 /// The odd size of a kernel next to a length.
 fn odd(px: f64) -> u32 {
-    2 * ((px.clamp(3.0, MAX_KERNEL_PX) - 1.0) / 2.0).round() as u32 + 1
+    2 * ((px.clamp(3.0, f64::from(MAX_KERNEL_PX)) - 1.0) / 2.0).round() as u32 + 1
 }
 
 /// The colours of a model, field by field: `field` makes the three channels' coefficients of a feature new.

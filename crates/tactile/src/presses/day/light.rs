@@ -4,7 +4,8 @@
 //! the frame at rest they do to the change of a contact. That is linear in the eight numbers of a colour, and a fit follows from
 //! sums over pixels. u and v are those of the colours of a sensor file.
 
-use super::taken::Taken;
+use super::ZONE_COUNT;
+use super::taken::{ROUNDING, Taken};
 use crate::grid::Plane;
 use nalgebra::{Cholesky, SMatrix, SVector};
 
@@ -19,9 +20,6 @@ const ROUNDS: usize = 6;
 
 /// Standard deviation of a number before anything was seen. A frame of one even colour leaves its mixture open.
 const PRIOR_SD: f64 = 0.3;
-
-/// Squared error that rounding to whole grey levels makes.
-const ROUNDING: f64 = 1.0 / 12.0;
 
 /// What became of the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +81,8 @@ impl PressSums {
     /// Of a press and of what the sensor file says of it.
     pub(super) fn of(taken: &Taken, rest: &[Vec<f32>; 3], change: &[Plane; 3]) -> Self {
         let zero = || Sums { products: SMatrix::zeros(), targets: SVector::zeros(), energy: 0.0 };
-        let mut zones: Vec<([Sums; 3], usize)> = (0..4).map(|_| ([zero(), zero(), zero()], 0)).collect();
+        let mut zones: Vec<([Sums; 3], usize)> =
+            (0..ZONE_COUNT).map(|_| ([zero(), zero(), zero()], 0)).collect();
         let place = place(taken.width, taken.zones.len() / taken.width);
         for (p, zone) in taken.zones.iter().enumerate() {
             let before = [0, 1, 2].map(|c| f64::from(rest[c][p] + change[c].values[p]).clamp(0.0, 255.0));
@@ -117,7 +116,7 @@ impl PressSums {
     }
 }
 
-/// The light under which some presses were taken: the least sum of the logarithms of what is left in each zone of each press.
+/// The light under which some presses were taken: the least sum of the logarithms of the residual in each zone of each press.
 pub(super) fn fit<'a>(presses: impl Iterator<Item = &'a PressSums> + Clone) -> Light {
     let mut light = Light::SAME;
     for _ in 0..ROUNDS {

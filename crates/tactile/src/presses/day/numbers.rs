@@ -4,17 +4,12 @@ use super::tried::SINK_IN_STEP;
 use super::verdict::mean_and_se;
 use super::{Change, DayNumber};
 use crate::sensor::Sensor;
-
-/// Half the width of a 90 % interval in standard errors, by the degrees of freedom (Student).
-fn student90(freedom: usize) -> f64 {
-    const T: [f64; 9] = [6.31, 2.92, 2.35, 2.13, 2.02, 1.94, 1.89, 1.86, 1.83];
-    freedom.checked_sub(1).and_then(|i| T.get(i)).copied().unwrap_or(1.7)
-}
+use gripgen_twin::values::t_quantile_95;
 
 /// The mean factor of some logarithms of radii.
 pub(super) fn radius(ln_radii: &[f64]) -> DayNumber {
     let (mean, se) = mean_and_se(ln_radii);
-    let off = student90(ln_radii.len().saturating_sub(1)) * se;
+    let off = t_quantile_95(ln_radii.len() as f64 - 1.0) * se;
     let at = |off: f64| libm::exp(mean + off);
     DayNumber { name: "radius_factor", value: at(0.0), low90: at(-off), high90: at(off) }
 }
@@ -30,7 +25,7 @@ pub(super) fn numbers(change: &Change, folds: &[Change], sensor: &Sensor, ball_m
         let squares: f64 = without.iter().map(|v| (v - mean) * (v - mean)).sum();
         // A value on a grid is known to a step of it at best.
         let se = libm::hypot((squares * (n.max(1) - 1) as f64 / n.max(1) as f64).sqrt(), step / 12f64.sqrt());
-        let off = student90(n.saturating_sub(1)) * se;
+        let off = t_quantile_95(n as f64 - 1.0) * se;
         DayNumber { name, value, low90: value - off, high90: value + off }
     };
     of(change).into_iter().enumerate().map(number).collect()

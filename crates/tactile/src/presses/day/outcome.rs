@@ -75,7 +75,7 @@ pub(super) struct Outcome {
     pub(super) drawn: Vec<TactileImage>,
     pub(super) map: TactileImage,
     pub(super) spots: Vec<Spot>,
-    /// Whether what is left is what a sensor file may leave.
+    /// Whether the residual is small enough for a sensor file.
     pub(super) explained: bool,
 }
 
@@ -92,7 +92,7 @@ pub(super) fn outcome(
     let (mut before, mut after) = (Squares::default(), Squares::default());
     let mut drawn = Vec::with_capacity(balls.len());
     let mut residuals = Vec::with_capacity(balls.len());
-    // What contacts change at all, and what is left of it.
+    // What contacts change, and the residual.
     let (mut shown, mut left) = (0.0, 0.0);
     for (i, (press, contact)) in balls.iter().zip(contacts).enumerate() {
         let old = predict_taken(press, &contact.within(ball_m, &grid), ball_m, sensor);
@@ -129,7 +129,7 @@ pub(super) fn outcome(
     }
 }
 
-/// Mean square of what is left far from contacts, and of what the presses differ by among themselves there.
+/// Mean square of the residual far from contacts, and of what the presses differ by among themselves there.
 fn far_field(residuals: &[Residuals], known: &[bool]) -> (f64, f64) {
     let (mut all, mut own, mut count) = (0.0, 0.0, 0usize);
     for p in (0..known.len()).filter(|&p| known[p]) {

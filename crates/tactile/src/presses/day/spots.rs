@@ -1,6 +1,7 @@
-//! What is left at each place of the frame over the presses, and spots that are left time and again: scratches, dirt.
+//! Residuals at each place of the frame over the presses, and spots where several presses have one: scratches, dirt.
 
 use super::Spot;
+use crate::grid::islands;
 use crate::presses::{ZONES, Zone};
 use gripgen_twin::TactileImage;
 
@@ -21,7 +22,7 @@ const ENLARGED: f32 = 8.0;
 /// From the median of magnitudes to the standard deviation of a normal distribution.
 const FROM_MEDIAN: f32 = 1.4826;
 
-/// What is left of one press.
+/// Residual of one press.
 pub(super) struct Residuals {
     /// Real minus drawn.
     pub(super) grey: Vec<[f32; 3]>,
@@ -41,7 +42,7 @@ impl Residuals {
         let near = boxes(&light, width, 1);
         let around = boxes(&light, width, AROUND_PX);
         let sharp: Vec<f32> = near.iter().zip(&around).map(|(a, b)| a - b).collect();
-        let mut limits = [f32::INFINITY; 4];
+        let mut limits = [f32::INFINITY; ZONES.len()];
         for zone in ZONES {
             let mut list: Vec<f32> =
                 sharp.iter().zip(&self.zones).filter(|(_, z)| **z == zone).map(|(v, _)| v.abs()).collect();
@@ -90,29 +91,9 @@ pub(super) fn spots(residuals: &[Residuals], known: &[bool], width: usize) -> Ve
         let seen = each.iter().zip(residuals).filter(|(out, r)| out[p] == sign && r.zones[p] != Zone::Rim);
         seen.count()
     };
-    let mut left: Vec<bool> =
-        (0..pixels).map(|p| known[p] && (count(p, 1) >= 2 || count(p, -1) >= 2)).collect();
-    let mut found = Vec::new();
-    for start in 0..pixels {
-        if !left[start] {
-            continue;
-        }
-        let (mut open, mut spot) = (vec![start], Vec::new());
-        left[start] = false;
-        while let Some(p) = open.pop() {
-            spot.push(p);
-            let (x, y) = (p % width, p / width);
-            for (x, y) in [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)] {
-                if x < width && y < pixels / width && left[y * width + x] {
-                    left[y * width + x] = false;
-                    open.push(y * width + x);
-                }
-            }
-        }
-        if spot.len() >= LEAST_PX {
-            found.push(named(&spot, residuals, &each, width));
-        }
-    }
+    let seen_twice = (0..pixels).map(|p| known[p] && (count(p, 1) >= 2 || count(p, -1) >= 2)).collect();
+    let islands = islands(seen_twice, width).into_iter().filter(|spot| spot.len() >= LEAST_PX);
+    let mut found: Vec<Spot> = islands.map(|spot| named(&spot, residuals, &each, width)).collect();
     found.sort_by(|a, b| b.pixels.cmp(&a.pixels));
     found.truncate(MOST);
     found
@@ -135,7 +116,7 @@ fn named(spot: &[usize], residuals: &[Residuals], each: &[Vec<i8>], width: usize
     }
 }
 
-/// Mean over the presses of what is left, enlarged around a middle grey.
+/// Mean residual over the presses, enlarged around a middle grey.
 pub(super) fn map(residuals: &[Residuals], width: usize) -> TactileImage {
     let pixels = residuals.first().map_or(0, |r| r.grey.len());
     let n = residuals.len().max(1) as f32;

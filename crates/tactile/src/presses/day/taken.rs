@@ -7,7 +7,7 @@ use crate::presses::{Contact, Zone};
 use nalgebra::{Cholesky, Matrix3, Vector3};
 
 /// Squared error that rounding to whole grey levels makes: no model leaves less.
-const ROUNDING: f64 = 1.0 / 12.0;
+pub(super) const ROUNDING: f64 = 1.0 / 12.0;
 
 /// Fewest pixels by which a zone counts.
 const MIN_PIXELS: usize = 30;
@@ -34,7 +34,7 @@ pub(super) struct Allowed {
     pub(super) gain: [f32; 3],
 }
 
-/// What a drawing leaves.
+/// The residual of a drawing.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Left {
     /// Mean square of each zone that is there, grey levels squared.
@@ -46,7 +46,7 @@ pub(super) struct Left {
 }
 
 impl Left {
-    /// Sum over the zones of the logarithm of what is left, against another drawing of the same pixels.
+    /// Sum over the zones of the logarithm of the residual, against another drawing of the same pixels.
     pub(super) fn against(&self, other: &Self) -> f64 {
         let zones = self.squares.iter().zip(&other.squares);
         zones.filter_map(|(a, b)| Some(libm::log((*a)? / (*b)?))).sum()

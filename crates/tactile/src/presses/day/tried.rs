@@ -82,7 +82,7 @@ impl Day {
         self.taken.iter().zip(&self.wider).map(level).collect()
     }
 
-    /// What a change of the sensor costs in each press, against none: the sum over the zones of the logarithm of what is left.
+    /// What a change of the sensor costs in each press, against none: the sum over the zones of the logarithm of the residual.
     fn costs(&self, change: &Change) -> Vec<f64> {
         let sensor = changed(&self.sensor, change);
         let grid = &self.sensor.grid;
@@ -324,7 +324,7 @@ fn between(values: &[f64], at: usize) -> f64 {
     if curvature > 0.0 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }
 
-/// What is left of presses whose marks scatter, but together are as wide as they ought to be within what marks are unsure by: a
+/// Residuals of presses whose marks scatter, but together are as wide as they ought to be within what marks are unsure by: a
 /// factor beyond that, which all share, is a change. Returns the logarithms of the radii too.
 fn centred(n: usize, left: impl Fn(usize, Option<f64>) -> Left) -> (Vec<Left>, Vec<f64>) {
     let ln_radii: Vec<f64> = (0..n).map(|i| left(i, None).ln_radius).collect();
